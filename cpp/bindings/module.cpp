@@ -32,7 +32,9 @@ PYBIND11_MODULE(_core, m) {
   static_cast<void>(mgdd::wanted_instruction_set());  // refuses a wrong MGDD_INSTRUCTION_SET here, by name
   const std::vector<Room> rooms{
       {"math", "Places in look-up tables, and rows of numbers in a text.", {&bind_tables, &bind_number_rows}},
-      {"optimize", "Fits, seekers and learners.", {&bind_least_squares, &bind_limits, &bind_seekers, &bind_learning}},
+      {"optimize",
+       "Fits, seekers and learners.",
+       {&bind_least_squares, &bind_limits, &bind_seekers, &bind_map_seeking, &bind_learning}},
       {"control", "Controllers of a throttle plate.", {&bind_controllers, &bind_guided_predictive, &bind_supervisor}},
       {"engine",
        "Cycle model of one cylinder, emissions, performance, measured pressure.",

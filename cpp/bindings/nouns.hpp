@@ -10,6 +10,7 @@ void bind_number_rows(pybind11::module_& m);
 void bind_least_squares(pybind11::module_& m);
 void bind_limits(pybind11::module_& m);
 void bind_seekers(pybind11::module_& m);
+void bind_map_seeking(pybind11::module_& m);
 void bind_learning(pybind11::module_& m);
 void bind_controllers(pybind11::module_& m);
 void bind_guided_predictive(pybind11::module_& m);

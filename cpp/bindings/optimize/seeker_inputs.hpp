@@ -56,6 +56,11 @@ inline py::array_t<double> input_array(const optimize::Inputs& values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
+/// The other way round; the caller has counted the entries.
+inline optimize::Inputs inputs_of_array(const InputArray& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), values.size());
+}
+
 inline std::vector<double> list_of(const optimize::Inputs& values) {
   return {values.begin(), values.end()};
 }

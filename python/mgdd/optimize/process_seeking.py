@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,22 +16,22 @@ from mgdd.errors import Error, ParameterError, ShapeError
 from mgdd.optimize.inputs import by_name_or_number
 from mgdd.optimize.seeker import Seeker
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7, 5: 5}  # per input: 5 inputs are asked for 3,125 times
 
 
-def surface_of(
-    guide: Any, names: Sequence[str], lower: Sequence[float], upper: Sequence[float], *, argument: str
-) -> Any:
-    """Read a guide in any of its forms."""
+def surface_of(guide: Any, names: Sequence[str], axes: Sequence[NDArray[np.float64]], *, argument: str) -> Any:
+    """Read a guide in any of its forms over these nodes."""
     if guide is None or isinstance(guide, Surface):
         return guide
     if hasattr(guide, "dims") and hasattr(guide, "coords"):
         return _of_map(guide, names, argument)
-    if len(lower) not in _NODES:
-        raise ShapeError(f"{argument}: a guide is over one to five inputs, and there are {len(lower)}: leave it out")
-    if not np.isfinite([*lower, *upper]).all():
+    if len(axes) not in _NODES:
+        raise ShapeError(f"{argument}: a guide is over one to five inputs, and there are {len(axes)}: leave it out")
+    if not all(np.isfinite(axis).all() for axis in axes):
         raise ParameterError(f"{argument}: a guide is asked between the bounds, and some are infinite: give both")
-    axes = [np.linspace(low, high, _NODES[len(lower)]) for low, high in zip(lower, upper, strict=True)]
     model = getattr(guide, "model", guide)
     if hasattr(model, "predict"):
         if not names:
@@ -97,6 +97,7 @@ def with_guides(settings: Mapping[str, Any]) -> dict[str, Any]:
         size = np.size(out.get("start", 0.0))
         lower, upper = (np.broadcast_to(np.asarray(out.get(side, far), np.float64), size).tolist()
                         for side, far in (("lower", -math.inf), ("upper", math.inf)))  # fmt: skip
+    axes = [np.linspace(low, high, _NODES.get(len(lower), 2)) for low, high in zip(lower, upper, strict=True)]
     for argument, of in (("guide", None), ("limit_guides", [one.name for one in out.get("limits", ())])):
         given = out.get(argument)
         if given is None:
@@ -105,7 +106,7 @@ def with_guides(settings: Mapping[str, Any]) -> dict[str, Any]:
             given = _in_order(given, of, argument)
         several = isinstance(given, list | tuple)
         out[argument] = [
-            surface_of(one, names, lower, upper, argument=f"{argument}[{k}]" if several else argument)
+            surface_of(one, names, axes, argument=f"{argument}[{k}]" if several else argument)
             for k, one in enumerate(given if several else [given])
         ]
     return out

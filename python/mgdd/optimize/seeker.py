@@ -196,8 +196,8 @@ class Seeker(SeekerFindings):
             "format": _FORMAT,
             "kind": self.kind,
             "mgdd_version": _core.__version__,
-            "settings": _encode(self.settings),
-            "state": _encode(self.state),
+            "settings": encoded(self.settings),
+            "state": encoded(self.state),
         }
         write_whole_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
@@ -222,7 +222,7 @@ class Seeker(SeekerFindings):
         OSError
             The file cannot be read.
         """
-        kind, settings, state = _read(path)
+        kind, settings, state = read_saved(path)
         classes = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
         if kind not in classes:
             raise DataError(hinted(f"{Path(path)}: holds a {kind}, not a {' or '.join(classes)}", kind, classes))
@@ -247,7 +247,7 @@ class Seeker(SeekerFindings):
         return as_html(type(self).__name__, rows_of({**now, **self.settings}))
 
 
-def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def read_saved(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Read kind, settings and state of a file that `Seeker.save` wrote; DataError for any other file."""
     file = Path(path)
     try:
@@ -275,20 +275,20 @@ def rebuilt(cls: type[Any], settings: dict[str, Any], state: dict[str, Any], his
     return seeker
 
 
-def _encode(value: Any) -> Any:
+def encoded(value: Any) -> Any:
     """JSON has no infinities and no objects: both become tagged mappings."""
     if isinstance(value, float) and not math.isfinite(value):
         return {"number": repr(value)}
     if tag := next((tag for tag, kind in _RECORDS.items() if isinstance(value, kind)), ""):
-        return {tag: _encode(value.to_dict())}
+        return {tag: encoded(value.to_dict())}
     if isinstance(value, _core.guide.Curve):
         return {"curve": value._table}
     if isinstance(value, _core.optimize.Surface):
         return {"surface": [value.axes, value.values.ravel().tolist()]}
     if isinstance(value, dict):
-        return {name: _encode(item) for name, item in value.items()}
+        return {name: encoded(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [_encode(item) for item in value]
+        return [encoded(item) for item in value]
     return value
 
 

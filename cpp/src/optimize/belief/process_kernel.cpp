@@ -8,14 +8,12 @@ namespace {
 
 // Priors, in bends: J = level - bend/2 |z - 1/2|^2 + slopes (sd 0.4) + bends (0.6) + couplings (0.5) + the rest.
 constexpr double level_sd = 3.0, slope_sd = 0.4, bend_sd = 0.6, coupling_sd = 0.5;
-constexpr double guide_sd = 0.5;        // of the guide's factor about the one it counts by
-constexpr double place_sd = 0.2;        // of the guide's place, in ranges
 constexpr double parabola_sd = 0.0745;  // of |z - 1/2|^2 over evenly spread z, one input: 1/sqrt(180)
 
 }  // namespace
 
-ProcessKernel::ProcessKernel(Eigen::Index inputs, bool bends_down, ProcessGuide guide)
-    : inputs_(inputs), bends_down_(bends_down), guide_(std::move(guide)) {
+ProcessKernel::ProcessKernel(Eigen::Index inputs, Eigen::Index context, bool bends_down, ProcessGuide guide)
+    : inputs_(inputs), context_(context), bends_down_(bends_down), guide_(std::move(guide)) {
   if (!guided()) return;
   const Eigen::Map<const Eigen::ArrayXd> values(guide_.surface.values().data(),
                                                 static_cast<Eigen::Index>(guide_.surface.values().size()));
@@ -38,7 +36,7 @@ double ProcessKernel::mean(const double* point, const Scales& s) const noexcept 
   const double guided = s.guide * guide_at(point);
   if (!bends_down_) return guided;
   double sum = 0.0;
-  for (Eigen::Index i = 0; i < inputs_; ++i)
+  for (Eigen::Index i = context_; i < inputs_; ++i)
     sum += (point[i] - 0.5) * (point[i] - 0.5);
   return guided - 0.5 * s.bend * s.bend / whole_bend(s) * sum;  // a guide that counts holds the bend already
 }
@@ -55,7 +53,7 @@ ProcessKernel::Fixed ProcessKernel::fixed(const double* a, const double* b) cons
     double places = 0.0;
     for (Eigen::Index i = inputs_ + 1; i < width(); ++i)
       places += a[i] * b[i];
-    guide = guide_sd * guide_sd * a[inputs_] * b[inputs_] + place_sd * place_sd * places;
+    guide = guide_.factor_sd * guide_.factor_sd * a[inputs_] * b[inputs_] + guide_.place_sd * guide_.place_sd * places;
   }
   return {slope_sd * slope_sd * slopes + bend_sd * bend_sd * bends + coupling_sd * coupling_sd * couplings, guide};
 }
@@ -75,7 +73,7 @@ double ProcessKernel::join(const Fixed& f, double matern, const Scales& s) const
   return level * level + s.bend * s.bend * (f.quadratic + s.rest * matern) + s.guide * s.guide * f.guide;
 }
 
-void ProcessKernel::covariances(const double* point, const InputTable& others, Eigen::Index count, const Scales& s,
+void ProcessKernel::covariances(const double* point, const Columns& others, Eigen::Index count, const Scales& s,
                                 double* out) const noexcept {
   using Row = Eigen::Array<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, most_kept>;
   Row slopes = Row::Zero(count), rest = slopes, squares = slopes, both(count);
@@ -92,9 +90,9 @@ void ProcessKernel::covariances(const double* point, const InputTable& others, E
   const double level = level_sd * whole_bend(s);
   rest = level * level + s.bend * s.bend * rest;
   if (guided()) {
-    both = guide_sd * guide_sd * point[inputs_] * others.row(inputs_).head(count).array();
+    both = guide_.factor_sd * guide_.factor_sd * point[inputs_] * others.row(inputs_).head(count).array();
     for (Eigen::Index i = inputs_ + 1; i < width(); ++i)
-      both += place_sd * place_sd * point[i] * others.row(i).head(count).array();
+      both += guide_.place_sd * guide_.place_sd * point[i] * others.row(i).head(count).array();
     rest += s.guide * s.guide * both;
   }
   Eigen::Map<Row>(out, count) = rest;

@@ -24,17 +24,19 @@ constexpr double most_outliers = 0.25;  // of the readings: where there are more
 constexpr int waking_readings = 3;
 constexpr double waking_rise = 1e3;    // of what all earlier readings span
 constexpr double least_noise = 1e-12;  // of a reading
+constexpr double young = 0.1;          // memories, in which little has wandered
 
 }  // namespace
 
 ProcessModel::ProcessModel(const Settings& settings)
     : settings_(settings),
-      kernel_(settings.inputs, settings.bends_down, settings.guide),
+      kernel_(settings.inputs, settings.context, settings.bends_down, settings.guide),
       points_(InputTable::Zero(settings.kept, kernel_.width())),
       values_(Eigen::VectorXd::Zero(settings.kept)),
       ages_(values_),
       scatter_(Eigen::VectorXd::Ones(settings.kept)),
       weighed_(scatter_),
+      averaged_(scatter_),
       numbers_(Numbers::Zero(5 + settings.inputs + (kernel_.guided() ? 1 : 0))),
       columns_(InputTable::Zero(kernel_.width(), settings.kept)),
       quadratic_(settings.kept, settings.kept),
@@ -51,7 +53,8 @@ ProcessModel::ProcessModel(const Settings& settings)
       order_(static_cast<std::size_t>(settings.kept), 0),
       chosen_(evidence_readings, 0),
       kernels_(settings.most_points, settings.kept),
-      asked_(InputTable::Zero(settings.most_points, kernel_.width())) {
+      asked_(InputTable::Zero(settings.most_points, kernel_.width())),
+      asked_columns_(InputTable::Zero(kernel_.width(), settings.most_points)) {
   now_.inverse_length = Inputs::Ones(settings.inputs);
 }
 
@@ -119,13 +122,37 @@ int ProcessModel::crowded_reading(const Inputs& about) noexcept {
   return *std::max_element(begin, near, [&](int a, int b) { return ages_[a] < ages_[b]; });
 }
 
-double ProcessModel::record(const Inputs& z, double value, const Inputs& about) noexcept {
-  const double odd = oddness(z, value);
-  const int at = count_ < settings_.kept ? static_cast<int>(count_++) : crowded_reading(about);
+// One that the process follows, of about the same input and time; -1 where there is none.
+int ProcessModel::alike_reading(const Inputs& z) const noexcept {
+  for (std::int64_t i = 0; i < count_ && settings_.alike >= 0.0; ++i) {
+    const double off = (points_.row(i).head(z.size()).transpose() - z).cwiseAbs().maxCoeff();
+    if (off <= settings_.alike && trusted(i) && ages_[i] <= young * settings_.memory) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+double ProcessModel::record(const Inputs& z, double value, const Inputs& about, double readings) noexcept {
+  const double odd = oddness(z, value, readings);
   ages_.head(count_).array() += 1.0;
+  const int known = scatter_of(odd) <= most_trusted ? alike_reading(z) : -1;
+  if (known >= 0) {
+    averaged_[known] += readings;
+    const double share = readings / averaged_[known];
+    Inputs middle = points_.row(known).head(settings_.inputs).transpose();
+    middle += share * (z - middle);
+    kernel_.describe(middle, &points_(known, 0));
+    values_[known] += share * (value - values_[known]);
+    ages_[known] *= 1.0 - share;
+    ++told_;
+    if (tables_known_) tabulate(known);
+    factored_ = false;
+    return odd;
+  }
+  const int at = count_ < settings_.kept ? static_cast<int>(count_++) : crowded_reading(about);
   kernel_.describe(z, &points_(at, 0));
   values_[at] = value;
   ages_[at] = 0.0;
+  averaged_[at] = readings;
   scatter_[at] = weighed_[at] = told_ < more_readings ? 1.0 : scatter_of(odd);
   ++told_;
   if (tables_known_) tabulate(at);
@@ -133,7 +160,7 @@ double ProcessModel::record(const Inputs& z, double value, const Inputs& about) 
   return odd;
 }
 
-double ProcessModel::oddness(const Inputs& z, double value) noexcept {
+double ProcessModel::oddness(const Inputs& z, double value, double readings) noexcept {
   if (settings_.labels || !begun_ || count_ < 3 * static_cast<std::int64_t>(settings_.inputs + 1)) return 1.0;
   refresh();
   double* const point = &asked_(0, 0);
@@ -144,7 +171,7 @@ double ProcessModel::oddness(const Inputs& z, double value) noexcept {
   solve_lower(factor_, count_, own);
   const double known = kernel_.covariance(point, point, now_) - dot(own, own, count_);
   const double noise = std::max(noise_sd(), least_noise * std::abs(value));
-  return off * off / std::max(std::max(known, 0.0) + noise * noise, 1e-300);
+  return off * off / std::max(std::max(known, 0.0) + noise * noise / readings, 1e-300);
 }
 
 bool ProcessModel::trusted(std::int64_t reading) const noexcept {
@@ -164,8 +191,8 @@ void ProcessModel::weigh() noexcept {
   weighed_ = scatter_;
   if (settings_.labels || told_ < fewest_weighed) return;
   for (std::int64_t i = 0; i < count_; ++i) {
-    const double left = weights_[i] * scatter_[i];  // over the variance of a reading
-    weighed_[i] = scatter_of(left * left * now_.noise_variance);
+    const double left = weights_[i] * scatter_[i] / averaged_[i];  // over the variance of a reading
+    weighed_[i] = scatter_of(left * left * now_.noise_variance * averaged_[i]);
   }
 }
 
@@ -202,6 +229,7 @@ void ProcessModel::forget() noexcept {
   begun_ = factored_ = tables_known_ = false;
   scatter_.setOnes();
   weighed_.setOnes();
+  averaged_.setOnes();
   points_.setZero();
   values_.setZero();
   ages_.setZero();
@@ -234,7 +262,7 @@ void ProcessModel::factor() noexcept {
       factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_) +
                       wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), now_);
     }
-    factor_(i, i) += now_.noise_variance * scatter_[i] + jitter * now_.bend * now_.bend;
+    factor_(i, i) += noise_of(i, now_) + jitter * now_.bend * now_.bend;
   }
   cholesky(factor_, count_);
   solve_lower(factor_, count_, weights_.data());
@@ -279,6 +307,7 @@ void ProcessModel::predict(const InputTable& at, int points) noexcept {
   factor_.topLeftCorner(count_, count_)
       .triangularView<Eigen::Lower>()
       .solveInPlace(kernels_.topLeftCorner(points, count_).transpose());
+  asked_columns_.leftCols(points) = asked_.topRows(points).transpose();
 }
 
 void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
@@ -289,6 +318,15 @@ void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
     kernel_.covariances(&asked_(p, 0), columns_, count_, now_, own);
     mean_[p] = level_ + kernel_.mean(&asked_(p, 0), now_) + dot(own, weights_.data(), count_);
   }
+}
+
+void ProcessModel::covariances(int i, int points, double* out) const noexcept {
+  for (int from = 0; from < points; from += most_kept) {
+    const int some = std::min(most_kept, points - from);
+    kernel_.covariances(&asked_(i, 0), asked_columns_.middleCols(from, some), some, now_, out + from);
+  }
+  Eigen::Map<Eigen::VectorXd>(out, points).noalias() -=
+      kernels_.topLeftCorner(points, count_) * kernels_.row(i).head(count_).transpose();
 }
 
 double ProcessModel::covariance(int i, int j) const noexcept {

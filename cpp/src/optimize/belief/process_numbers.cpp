@@ -15,12 +15,11 @@ namespace {
 
 // Priors of logarithms.
 constexpr double noise_prior = -5.3, noise_prior_sd = 1.5;
-constexpr double rest_prior = -4.5, rest_prior_sd = 1.5;
+constexpr double rest_prior_sd = 1.5;
 constexpr double length_prior = -0.7, length_prior_sd = 0.7;
 constexpr double settled_sd = 0.4;  // of the bend, once the first readings have shown it
 constexpr double bend_search_sd = 1.5;
-constexpr double guided_bend_prior = -1.0, guided_bend_prior_sd = 0.7;  // of the bend over that of J as a whole
-constexpr double factor_width = 0.5;                                    // of what the guide counts by: heavy tails
+constexpr double factor_width = 0.5;  // of what the guide counts by: heavy tails
 constexpr double useless_factor = -6.0;
 constexpr double wander_place = 0.04, wander_level = 1.2;  // in a memory: slopes in bends, the level in noise
 constexpr double wander_sd = 1.0;                          // of their logarithms
@@ -83,7 +82,7 @@ double ProcessModel::evidence(const Numbers& numbers, bool same_lengths) noexcep
       small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s) +
                      wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), s);
     }
-    small_(a, a) += s.noise_variance * scatter_[one] + jitter * s.bend * s.bend;
+    small_(a, a) += noise_of(one, s) + jitter * s.bend * s.bend;
   }
   cholesky(small_, n);
   solve_lower(small_, n, small_rest_.data());
@@ -132,14 +131,14 @@ ProcessModel::Correction ProcessModel::over_bends(const Inputs& z) noexcept {
 double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const noexcept {
   const double whole = std::log(kernel_.whole_bend(s));
   double out = log_prior(0.5 * std::log(s.noise_variance) - whole, noise_prior, noise_prior_sd) +
-               log_prior(numbers[2], rest_prior, rest_prior_sd);
+               log_prior(numbers[2], settings_.rest, rest_prior_sd);
   for (Eigen::Index i = 0; i < settings_.inputs; ++i)
     out += log_prior(numbers[3 + i], length_prior, length_prior_sd);
   for (Eigen::Index i = 3 + settings_.inputs; i < 5 + settings_.inputs; ++i)
     out += log_prior(numbers[i], 0.0, settings_.wander_sd);
   if (kernel_.guided()) {
     const double factor = numbers[numbers.size() - 1] / factor_width;
-    out += log_prior(numbers[0] - whole, guided_bend_prior, guided_bend_prior_sd) - std::log1p(factor * factor);
+    out += log_prior(numbers[0] - whole, settings_.missed, settings_.missed_sd) - std::log1p(factor * factor);
   }
   if (settings_.bend && !kernel_.guided()) out += log_prior(numbers[0], std::log(*settings_.bend), 1.0);
   if (settled_bend_) out += log_prior(numbers[0], *settled_bend_, settled_sd);
@@ -154,7 +153,7 @@ double ProcessModel::likelihood(const InputTable& at, const Eigen::VectorXd& val
   Numbers plain = numbers_;
   plain[0] = std::log(std::max(rise, 1e-300) / (0.3 * std::max(wide.norm(), 1e-6)));
   plain[1] = noise_prior;
-  plain[2] = rest_prior;
+  plain[2] = settings_.rest;
   plain.segment(3, settings_.inputs).setConstant(length_prior);
   plain.segment(3 + settings_.inputs, 2).setZero();
   double most = likelihood_by(numbers_, at, values, ages, count);
@@ -218,13 +217,13 @@ double ProcessModel::bend_in_readings() const noexcept {
 void ProcessModel::begin_numbers(bool by_guide) noexcept {
   numbers_[0] = bend_in_readings();
   numbers_[1] = noise_prior;
-  numbers_[2] = rest_prior;
+  numbers_[2] = settings_.rest;
   numbers_.segment(3, settings_.inputs).setConstant(length_prior);
   numbers_.segment(3 + settings_.inputs, 2).setZero();
   if (kernel_.guided()) numbers_[numbers_.size() - 1] = 0.0;
   if (by_guide) {
-    numbers_[0] = std::log(kernel_.guide_bend()) + guided_bend_prior;
-    numbers_[1] = noise_prior - guided_bend_prior;
+    numbers_[0] = std::log(kernel_.guide_bend()) + settings_.missed;
+    numbers_[1] = noise_prior - settings_.missed;
   }
   begun_ = true;
 }
@@ -287,7 +286,7 @@ ProcessModel::Numbers ProcessModel::anew(std::uint64_t trial) const noexcept {
   Numbers out = numbers_;
   out[0] += bend_search_sd * normal(101);
   out[1] = noise_prior + noise_prior_sd * normal(102);
-  out[2] = rest_prior + rest_prior_sd * normal(103);
+  out[2] = settings_.rest + rest_prior_sd * normal(103);
   out.segment(3, settings_.inputs).setConstant(length_prior);
   if (kernel_.guided()) {
     const double fitted[] = {guide_in_readings(), 0.0, useless_factor};

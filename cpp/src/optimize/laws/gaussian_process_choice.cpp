@@ -8,23 +8,19 @@
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/process_laws.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
-constexpr double cloud_nearest = 0.011, cloud_farthest = 0.3;  // of the near ones, as a share of the bounds
 constexpr int search_rounds = 6, search_points = 12;
 constexpr double search_width = 0.08, search_shrinks = 0.45;
-constexpr double growth = 0.4;                          // beyond what has been explored, in widths of that
-constexpr double guided_reach = 0.2;                    // beyond it at least where there is a guide, in ranges
-constexpr double planned_readings[] = {1, 4, 16};       // that the worth of an input is reckoned with
-constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
-constexpr double cautious_readings = 5.0;               // per input and one: before them the horizon is shorter
-constexpr std::int64_t resting = 40;                    // inputs at the estimate, then the search is over
-constexpr double turned = -0.7;                         // what a first step is multiplied by after a failure
-constexpr std::int64_t most_turns = 6;                  // for them; then inputs that cannot move are left alone
-constexpr double worth_noise = 1e-12;                   // of J, at least
-constexpr double along_edges = 4.0;                     // sd of J that reading it along limits is worth
+constexpr double growth = 0.4;           // beyond what has been explored, in widths of that
+constexpr double guided_reach = 0.2;     // beyond it at least where there is a guide, in ranges
+constexpr std::int64_t resting = 40;     // inputs at the estimate, then the search is over
+constexpr double turned = -0.7;          // what a first step is multiplied by after a failure
+constexpr std::int64_t most_turns = 6;   // for them; then inputs that cannot move are left alone
+constexpr double along_edges = 4.0;      // sd of J that reading it along limits is worth
 constexpr double along_readings = 10.0;  // of the fewest, until it is worth that: early sd promise too much
 constexpr double along_cycles = 100.0;   // without a doubt, then it is worth less and less
 
@@ -56,7 +52,8 @@ double GaussianProcessSeeking::draw(std::uint64_t stream, int index) const noexc
 void GaussianProcessSeeking::choose() noexcept {
   const Eigen::Index n = estimate_.size();
   const auto enough = [](const ProcessModel& m) { return m.count() >= m.fewest(); };
-  const bool read = std::all_of(j_.begin(), j_.end(), enough) && std::all_of(limited_.begin(), limited_.end(), enough);
+  const bool read = std::ranges::all_of(j_, enough) &&
+                    std::ranges::all_of(limited_, [&](const LimitProcess& one) { return enough(one.model()); });
   const bool to_every_side = (highest_ - lowest_).minCoeff() > 0.0 || star_ >= most_turns * (n + 1);
   if (!read || !(guided() || (star_ >= n && to_every_side))) return choose_first();
   const Inputs about = since_failure_ > 0 ? scaled(estimate_) : good_;
@@ -93,9 +90,9 @@ void GaussianProcessSeeking::choose() noexcept {
     variance += own.variance;
   }
   expected_ = (settings_.maximize ? 1.0 : -1.0) * (means_[0] + off);
-  expected_sd_ = student(j_[0]) * std::sqrt(std::max(variance, 0.0));
+  expected_sd_ = j_[0].widening(estimate_.size()) * std::sqrt(std::max(variance, 0.0));
   for (std::size_t i = 0; i < limited_.size(); ++i)
-    room_[i] = -excess(i, 0, quantile_) / settings_.limits[i].scale;
+    room_[i] = -limited_[i].excess(0, quantile_);
   const int next = over ? 0 : most_worth(points);
   const bool rests = over_[0] <= 0.0 && (candidates_.row(next) - candidates_.row(0)).cwiseAbs().maxCoeff() <= aside;
   rested_ = rests ? rested_ + 1 : 0;
@@ -103,11 +100,11 @@ void GaussianProcessSeeking::choose() noexcept {
 }
 
 void GaussianProcessSeeking::fit(const Inputs& about) noexcept {
-  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
-    for (ProcessModel& model : *models)
-      model.fit(about);
-  }
-  if (failures_known()) failing_.fit(about);
+  for (ProcessModel& model : j_)
+    model.fit(about);
+  for (LimitProcess& limited : limited_)
+    limited.model().fit(about);
+  failing_.fit(about);
 }
 
 // How far to the side of the estimate it pays to ask on and on: what is lost by it equals half of what is lost since
@@ -183,7 +180,7 @@ void GaussianProcessSeeking::choose_first() noexcept {
   const Eigen::Index n = estimate_.size();
   const std::int64_t turn = ++star_ / (n + 1), side = star_ % (n + 1) - 1;
   Inputs z = middle_;
-  const double step = side_step() * (failing_.count_above(0.0) > 0 ? std::pow(turned, static_cast<double>(turn)) : 1.0);
+  const double step = side_step() * (failing_.seen_one() ? std::pow(turned, static_cast<double>(turn)) : 1.0);
   if (side >= 0) {
     const double whole = protocol_.steps.any() ? std::max(std::abs(step), grid()[side]) : std::abs(step);
     z[side] += std::copysign(whole, z[side] < 0.5 ? step : -step);
@@ -283,41 +280,14 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
     return static_cast<int>(std::min_element(mean_over_.begin(), mean_over_.begin() + points) - mean_over_.begin());
   }
   if (std::ranges::any_of(multipliers_, [](double own) { return own > 0.0; })) return most_along(safe);
-  const std::vector<int>& kept = order_;
-  for (int a = 0; a < safe; ++a)
-    worth_mean_[at(a)] = means_[kept[at(a)]];
-  const double noise = std::max(noise_sd(), worth_noise * std::abs(worth_mean_[0]));
-  const std::span<const double> means(worth_mean_.data(), at(safe));
-  const std::span<double> effects(effect_.data(), at(safe));
+  const double noise = std::max(noise_sd(), worth_noise * std::abs(means_[order_[0]]));
   // In units of what may be asked anew; early numbers of the processes promise too much.
   const double read =
       static_cast<double>(j_[0].count()) / (cautious_readings * static_cast<double>(1 + estimate_.size()));
   const double horizon = settings_.horizon * std::min(1.0, read) / static_cast<double>(hold_);
-  double most = 0.0;
-  int best = -1;
-  std::array<int, candidates> scratch{};
-  for (int a = 0; a < safe; ++a) {
-    double taught = 0.0;
-    const auto [least, steepest] = std::ranges::minmax_element(kept.begin(), kept.begin() + safe, {},
-                                                               [&](int b) { return covariance_(b, kept[at(a)]); });
-    const double range = covariance_(*steepest, kept[at(a)]) - covariance_(*least, kept[at(a)]);
-    for (const double readings : planned_readings) {
-      const double sd = std::sqrt(std::max(covariance_(kept[at(a)], kept[at(a)]), 0.0) + noise * noise / readings);
-      if (!(sd > 0.0)) continue;
-      // The largest of lines through one point rises by their range of slopes times E max(Z, 0) at most.
-      const double at_most = rise_of_normal * range / (sd * readings);
-      if (at_most <= taught || (best >= 0 && means[at(a)] + horizon * at_most <= most)) continue;
-      for (int b = 0; b < safe; ++b)
-        effects[at(b)] = covariance_(kept[at(b)], kept[at(a)]) / sd;
-      const double gain = knowledge_gradient(means, effects, {scratch.data(), at(safe)}, {breaks_.data(), at(safe)});
-      taught = std::max(taught, gain / readings);
-    }
-    const double worth = means[at(a)] + horizon * taught;
-    if (best >= 0 && !(worth > most)) continue;
-    most = worth;
-    best = kept[at(a)];
-  }
-  return best;
+  return optimize::most_worth(
+      {order_.data(), at(safe)}, [this](int p) { return means_[p]; },
+      [this](int p, int q) { return covariance_(p, q); }, noise, horizon, worth_);
 }
 
 }  // namespace mgdd::optimize

@@ -1,4 +1,5 @@
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/process_laws.hpp"
 
 #include <algorithm>
 #include <array>
@@ -15,19 +16,9 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr double surprise_rate = 0.1, most_surprise = 3.0;
-constexpr double most_odd = 12.0;         // so that no single reading raises a doubt, but two in a row
 constexpr std::int64_t calm_cycles = 10;  // after a doubt
-constexpr double doubt_age = 10.0;        // memories
-constexpr double least_share = 1e-3;      // of a limit, that a reading counts as at least
-constexpr double clear_of_zero = 3.0;     // sd of a reading there, above which the logarithm of a reading has a scatter
-constexpr double expected_bend = 3.0;     // of a limited quantity, in its scale: few readings must not promise too much
-constexpr double label_noise = 0.3;       // of whether a cycle works: 1 or -1
 constexpr std::int64_t most_wary = 64;    // cycles that work, after a failure
 constexpr double held_share = 0.7;        // of the longest lag, for which an input is asked
-constexpr double cautious_cycles = 40.0;  // in all of which a limit is to hold with the stated probability
-constexpr double calm_limits = 0.3;       // over what is expected of J: limits wander less, or are seen to
-constexpr double calm_limits_sd = 2.0;    // logarithm
 constexpr double plane_memory = 20.0;     // cycles of the planes that tell the delays from one another
 
 // Of the limits. Lags are taken out of the readings instead (`LagWindow`).
@@ -47,25 +38,6 @@ std::vector<DelayFinder> finders_of(const GaussianProcessSeekingSettings& s) {
     out.emplace_back(lag.delay_cycles, uncertain ? s.delay_uncertainty : 0, s.space.size());
   }
   return out;
-}
-
-// Of quantities that spread over powers of ten, as NOx, the logarithm is learnt, with slope 1 at the limit.
-double learnt_of(const Limit& limit, bool logarithm, double value) {
-  if (!logarithm) return value;
-  return limit.upper * (1.0 + std::log(std::max(value / limit.upper, least_share)));
-}
-double read_of(const Limit& limit, bool logarithm, double learnt) {
-  return logarithm ? limit.upper * std::exp(learnt / limit.upper - 1.0) : learnt;
-}
-
-// Whether a limited quantity may be learnt by its logarithm: not where it comes as near to zero as its noise.
-bool stands_above_zero(const Limit& limit, double lowest, double noise_sd) {
-  return limit.upper > 0.0 && lowest > std::max(clear_of_zero * noise_sd, least_share * limit.upper);
-}
-bool guide_above_zero(const GaussianProcessSeekingSettings& s, std::size_t i) {
-  if (s.limit_guides.empty() || s.limit_guides[i].empty()) return s.limits[i].upper > 0.0;
-  const std::vector<double>& values = s.limit_guides[i].values();
-  return stands_above_zero(s.limits[i], *std::min_element(values.begin(), values.end()), 0.0);
 }
 
 ProcessModel::Settings process_settings(const GaussianProcessSeekingSettings& s, int most_points) {
@@ -91,32 +63,12 @@ std::vector<ProcessModel> component_processes(const GaussianProcessSeekingSettin
   return out;
 }
 
-std::vector<ProcessModel> limit_processes(const GaussianProcessSeekingSettings& s, int most_points) {
-  std::vector<ProcessModel> out;
+std::vector<LimitProcess> limit_processes(const GaussianProcessSeekingSettings& s, int most_points) {
+  std::vector<LimitProcess> out;
   for (std::size_t i = 0; i < s.limits.size(); ++i) {
-    ProcessModel::Settings own = process_settings(s, most_points);
-    own.bends_down = false;
-    own.bend = expected_bend * s.limits[i].scale;
-    own.wander = calm_limits;
-    own.wander_sd = calm_limits_sd;
-    if (!s.limit_guides.empty() && !s.limit_guides[i].empty()) {
-      std::vector<double> values = s.limit_guides[i].values();
-      for (double& value : values)
-        value = learnt_of(s.limits[i], guide_above_zero(s, i), value);
-      own.guide.surface = Surface(s.limit_guides[i].axes(), std::move(values));
-    }
-    out.emplace_back(own);
+    const Surface guide = s.limit_guides.empty() ? Surface{} : s.limit_guides[i];
+    out.emplace_back(s.limits[i], process_settings(s, most_points), guide, s.space.size(), 1.0);
   }
-  return out;
-}
-
-ProcessModel::Settings failing_settings(const GaussianProcessSeekingSettings& s, int most_points) {
-  ProcessModel::Settings out = process_settings(s, most_points);
-  out.guide = {};
-  out.bends_down = false;
-  out.bend = expected_bend;
-  out.noise_sd = label_noise;
-  out.labels = true;
   return out;
 }
 
@@ -133,33 +85,29 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       finders_(finders_of(settings_)),
       j_(component_processes(settings_, candidates + most_on_their_way)),
       limited_(limit_processes(settings_, candidates + most_on_their_way)),
-      failing_(failing_settings(settings_, candidates)),
+      failing_(process_settings(settings_, candidates)),
       estimate_(settings_.space.start),
       applied_(estimate_),
       middle_(scaled(estimate_)),
       good_(middle_),
       lowest_(middle_),
       highest_(middle_),
-      surprise_(j_.size(), 1.0),
+      surprise_(j_.size()),
       room_(settings_.limits.size(), 0.0),
-      logarithm_(room_),
       unsafe_(settings_.limits.empty() ? 0 : 1, 0.0),
       candidates_(InputTable::Zero(candidates + most_on_their_way, settings_.space.size())),
       edges_(InputTable::Zero(static_cast<Eigen::Index>(settings_.limits.size()), settings_.space.size())),
       covariance_(candidates, candidates),
       own_(candidates + most_on_their_way, candidates + most_on_their_way),
       means_(Eigen::VectorXd::Zero(candidates)),
-      worth_mean_(candidates, 0.0),
       effect_(candidates + most_on_their_way, 0.0),
-      breaks_(candidates, 0.0),
       over_(candidates, 0.0),
       mean_over_(candidates, 0.0),
       excess_(settings_.limits.size() * candidates, 0.0),
       multipliers_(room_),
       credit_(candidates, 0.0),
-      order_(candidates, 0) {
-  for (std::size_t i = 0; i < logarithm_.size(); ++i)
-    logarithm_[i] = guide_above_zero(settings_, i) ? 1.0 : 0.0;
+      order_(candidates, 0),
+      worth_(candidates) {
   double longest = 0.0;
   const auto add = [&](const ComponentLag& lag) {
     longest = std::max(longest, lag.lag_cycles);
@@ -203,8 +151,7 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   } else {
     wary_ = std::min(2 * wary_, most_wary);
   }
-  watch_failures(scaled(applied), worked);
-  failing_.record(scaled(applied), worked ? -1.0 : 1.0, scaled(estimate_));
+  failing_.record(scaled(applied), worked, scaled(estimate_));
   if (worked) {
     learn(reading, applied);
   } else {
@@ -248,34 +195,15 @@ void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied
       read.reset();
       if (causes_.known(i)) read = z;
     }
-    if (causes_.known(i) && windows_[j_.size() + i].take(value, z, hold_)) {
-      learn_limit(i, z, value, about);
-    }
+    if (causes_.known(i) && windows_[j_.size() + i].take(value, z, hold_)) limited_[i].record(z, value, about);
   }
   if (read) explore(*read);
-}
-
-// The form of a limit follows its readings; one with a guide keeps the form of that.
-void GaussianProcessSeeking::learn_limit(std::size_t i, const Inputs& z, double value, const Inputs& about) noexcept {
-  const Limit& limit = settings_.limits[i];
-  ProcessModel& model = limited_[i];
-  const bool was = logarithm_[i] > 0.0, guided = !settings_.limit_guides.empty() && !settings_.limit_guides[i].empty();
-  model.record(z, learnt_of(limit, was, value), about);
-  if (guided) return;
-  // In a logarithm what lies near zero looks like an outlier: there the new reading counts, and is weighed without it.
-  const double lowest = std::min(read_of(limit, was, model.lowest()), was ? value : unlimited);
-  double noise = 0.0;
-  if (model.count() > model.fewest() + 1) noise = model.noise_sd() * (was ? lowest / limit.upper : 1.0);
-  const bool now = stands_above_zero(limit, lowest, was ? noise : 2.0 * noise);
-  if (now == was) return;
-  model.retell([&](double told) { return learnt_of(limit, now, read_of(limit, was, told)); });
-  logarithm_[i] = now ? 1.0 : 0.0;
 }
 
 // A channel that stood still says no more than where it stood; what it says now has a scale of its own.
 void GaussianProcessSeeking::begin_anew(std::size_t component) noexcept {
   j_[component].forget();
-  surprise_[component] = 1.0;
+  surprise_[component].reset();
   middle_ = scaled(estimate_);
   star_ = rested_ = 0;
 }
@@ -288,15 +216,15 @@ void GaussianProcessSeeking::explore(const Inputs& z) noexcept {
 // Two readings in a row that the process does not explain: what was known before is aged.
 void GaussianProcessSeeking::watch_surprise(std::size_t component, double odd) noexcept {
   if (component == 0) ++since_doubt_;
-  double& surprise = surprise_[component];
-  surprise += surprise_rate * (std::min(odd, most_odd) - surprise);
-  if (since_doubt_ >= calm_cycles && surprise >= most_surprise) doubt();
+  const bool surprising = surprise_[component].add(odd);
+  if (since_doubt_ >= calm_cycles && surprising) doubt();
 }
 
 void GaussianProcessSeeking::doubt() noexcept {
   for (ProcessModel& model : j_)
     model.age(doubt_age * settings_.memory_cycles);
-  std::fill(surprise_.begin(), surprise_.end(), 1.0);
+  for (Surprise& one : surprise_)
+    one.reset();
   since_doubt_ = rested_ = 0;
   ++doubts_;
 }
@@ -319,8 +247,8 @@ void GaussianProcessSeeking::reseed(std::uint64_t seed) noexcept {
   settings_.seed = seed;
   for (ProcessModel& model : j_)
     model.reseed(seed);
-  for (ProcessModel& model : limited_)
-    model.reseed(seed);
+  for (LimitProcess& limited : limited_)
+    limited.model().reseed(seed);
   failing_.reseed(seed);
 }
 
@@ -334,19 +262,18 @@ void GaussianProcessSeeking::restart() noexcept {
   causes_.forget();
   for (DelayFinder& finder : finders_)
     finder.forget();
-  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
-    for (ProcessModel& model : *models)
-      model.forget();
-  }
+  for (ProcessModel& model : j_)
+    model.forget();
+  for (LimitProcess& limited : limited_)
+    limited.model().forget();
   failing_.forget();
   wary_ = least_wary;
-  seen_ = failed_ = 0.0;
-  anywhere_ = least_anywhere;
   middle_ = good_ = lowest_ = highest_ = scaled(estimate_);
   star_ = held_ = rested_ = since_doubt_ = since_failure_ = 0;
   for (LagWindow& window : windows_)
     window.forget();
-  std::fill(surprise_.begin(), surprise_.end(), 1.0);
+  for (Surprise& one : surprise_)
+    one.reset();
   expected_ = expected_sd_ = 0.0;
   std::fill(room_.begin(), room_.end(), 0.0);
   std::fill(unsafe_.begin(), unsafe_.end(), 0.0);

@@ -7,11 +7,9 @@
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/process_laws.hpp"
 
 namespace mgdd::optimize {
-namespace {
-
-// None, or one of each; a guide says something of every input, and not the same everywhere.
 void require_guides(const std::string& name, const std::vector<Surface>& guides, std::size_t count,
                     const std::string& whose, Eigen::Index inputs) {
   if (!guides.empty() && guides.size() != count) {
@@ -29,20 +27,22 @@ void require_guides(const std::string& name, const std::vector<Surface>& guides,
   }
 }
 
-}  // namespace
-
-GaussianProcessSeekingSettings resolved(GaussianProcessSeekingSettings s) {
-  const Eigen::Index n = s.space.size();
-  s.space = resolved(std::move(s.space));
-  validate(s.space, Inputs::Zero(n));
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const std::string name = s.space.inputs.empty() ? "" : " of " + s.space.inputs[static_cast<std::size_t>(i)].name;
-    for (const auto& [side, value] : {std::pair{"lower", s.space.lower[i]}, std::pair{"upper", s.space.upper[i]}}) {
+void require_finite_bounds(const SearchSpace& space) {
+  for (Eigen::Index i = 0; i < space.size(); ++i) {
+    const std::string name = space.inputs.empty() ? "" : " of " + space.inputs[static_cast<std::size_t>(i)].name;
+    for (const auto& [side, value] : {std::pair{"lower", space.lower[i]}, std::pair{"upper", space.upper[i]}}) {
       if (!std::isfinite(value)) {
         throw ParameterError(side + name, value, "must be finite: inputs are counted in their ranges");
       }
     }
   }
+}
+
+GaussianProcessSeekingSettings resolved(GaussianProcessSeekingSettings s) {
+  const Eigen::Index n = s.space.size();
+  s.space = resolved(std::move(s.space));
+  validate(s.space, Inputs::Zero(n));
+  require_finite_bounds(s.space);
   if (s.noise_sd) require_positive("noise_sd", *s.noise_sd);
   require_in(Domain{0.0, 1e6}, "horizon", s.horizon);
   require_in(Domain{10.0, 1e9}, "memory_cycles", s.memory_cycles);

@@ -10,15 +10,18 @@
 namespace mgdd::optimize {
 
 using InputTable = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // a row per point
+using Columns = Eigen::Ref<const InputTable, 0, Eigen::OuterStride<>>;                      // a column per point
 
 /// A guide of a process: a surface over inputs within these bounds, or none.
 struct ProcessGuide {
   Surface surface{};
   Inputs lower{}, upper{};
-  double sign = 1.0;  ///< -1 where less is better
+  double sign = 1.0;       ///< -1 where less is better
+  double factor_sd = 0.5;  ///< of its factor about the one it counts by
+  double place_sd = 0.2;   ///< of its place, in ranges
 };
 
-inline constexpr int most_kept = 200;  ///< readings of a process
+inline constexpr int most_kept = 500;  ///< readings of a process
 
 class ProcessKernel {
  public:
@@ -35,7 +38,8 @@ class ProcessKernel {
     double quadratic, guide;
   };
 
-  ProcessKernel(Eigen::Index inputs, bool bends_down, ProcessGuide guide);
+  /// `context`: how many of the inputs, the first ones, others set: there no maximum is expected.
+  ProcessKernel(Eigen::Index inputs, Eigen::Index context, bool bends_down, ProcessGuide guide);
 
   bool guided() const noexcept { return !guide_.surface.empty(); }
   Eigen::Index inputs() const noexcept { return inputs_; }
@@ -58,11 +62,11 @@ class ProcessKernel {
     return join(fixed(a, b), matern(a, b, s.inverse_length), s);
   }
   /// The same of one point with `count` others, whose descriptions are columns of a table; `most_kept` at most.
-  void covariances(const double* point, const InputTable& others, Eigen::Index count, const Scales& s,
+  void covariances(const double* point, const Columns& others, Eigen::Index count, const Scales& s,
                    double* out) const noexcept;
 
  private:
-  Eigen::Index inputs_;
+  Eigen::Index inputs_, context_;
   bool bends_down_;
   ProcessGuide guide_;
   double guide_middle_ = 0.0, guide_bend_ = 0.0;

@@ -5,6 +5,7 @@
 // and allocation-free after construction.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -22,6 +23,7 @@ class ProcessModel {
  public:
   struct Settings {
     Eigen::Index inputs = 1;
+    Eigen::Index context = 0;              ///< of these, the first ones: what others set
     int kept = 100;                        ///< readings, 10 at least
     int most_points = 100;                 ///< that `predict` is asked for at once
     double memory = 143.0;                 ///< [readings] in which level and slopes wander by what counts
@@ -30,17 +32,21 @@ class ProcessModel {
     std::optional<double> noise_sd{};      ///< of a reading, > 0; none: learnt
     std::optional<double> bend{};          ///< that is expected, to a factor of e; none: any
     bool labels = false;                   ///< readings are below or above 0: of the rarer ones those far away are kept
+    double missed = -1.0, missed_sd = 0.7;  ///< logarithm of the share of all bends that the guide is expected to miss
+    double rest = -4.5;                     ///< logarithm of the size of the rest over the bend, expected
+    double alike = -1.0;  ///< ranges of every input, within which young readings are averaged; below 0: never
     std::uint64_t seed = 0;
     ProcessGuide guide{};
   };
   explicit ProcessModel(const Settings& settings);
 
+  Eigen::Index inputs() const noexcept { return settings_.inputs; }
   int count() const noexcept { return static_cast<int>(count_); }
   double noise_sd() const noexcept;
 
-  /// Takes a reading at `z`; where all places are taken, the oldest of those near `about` makes room. The square of how
-  /// far it lies from what was expected, in standard deviations; 1 where little is known.
-  double record(const Inputs& z, double value, const Inputs& about) noexcept;
+  /// Takes a reading at `z`, or the mean of several; where all places are taken, the oldest of those near `about` makes
+  /// room. The square of how far it lies from what was expected, in standard deviations; 1 where little is known.
+  double record(const Inputs& z, double value, const Inputs& about, double readings = 1.0) noexcept;
   /// Looks for better numbers of the process and makes predictions possible; 2 readings at least, 1 with a guide.
   void fit(const Inputs& about) noexcept;
 
@@ -51,6 +57,13 @@ class ProcessModel {
   double mean(int point) const noexcept { return mean_[point]; }
   /// Of the quantity, without the noise of a reading, at two of these points.
   double covariance(int i, int j) const noexcept;
+  double sd(int point) const noexcept { return std::sqrt(std::max(covariance(point, point), 0.0)); }
+  /// By what quantiles of readings that are few over this many exceed normal ones.
+  double widening(Eigen::Index freedom) const noexcept {
+    return 1.0 + few_readings / std::max(1.0, static_cast<double>(count_ - freedom));
+  }
+  /// The same of one of them and of all `points` of the last prediction.
+  void covariances(int i, int points, double* out) const noexcept;
 
   /// What the bend, where readings leave it open, makes of the prediction at `z`: to be added to mean and variance.
   struct Correction {
@@ -106,6 +119,7 @@ class ProcessModel {
     v(name + "_ages", self.ages_);
     v(name + "_scatter", self.scatter_);
     v(name + "_weighed", self.weighed_);
+    v(name + "_averaged", self.averaged_);
     v(name + "_numbers", self.numbers_);
     v(name + "_settled_bend", self.settled_bend_);
     if constexpr (!std::is_const_v<Self>) self.tables_known_ = self.factored_ = false;
@@ -113,6 +127,7 @@ class ProcessModel {
 
  private:
   static constexpr int evidence_readings = 60, more_readings = 40;
+  static constexpr double few_readings = 2.0;  // over degrees of freedom
   // Logarithms: bend, noise over bend, size of the rest over bend, lengths; how fast slopes and level wander, over the
   // expected; what the guide counts by.
   using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6 + max_inputs, 1>;
@@ -127,7 +142,7 @@ class ProcessModel {
   void begin_numbers(bool by_guide) noexcept;
   void suspect() noexcept;
   void weigh() noexcept;
-  double oddness(const Inputs& z, double value) noexcept;
+  double oddness(const Inputs& z, double value, double readings) noexcept;
   bool trusted(std::int64_t reading) const noexcept;
   double middle() const noexcept;
   void try_numbers(int trials) noexcept;
@@ -141,6 +156,10 @@ class ProcessModel {
   void factor() noexcept;
   void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
+  int alike_reading(const Inputs& z) const noexcept;
+  double noise_of(std::int64_t reading, const Scales& s) const noexcept {
+    return s.noise_variance * scatter_[reading] / averaged_[reading];
+  }
   bool noise_known() const noexcept { return settings_.noise_sd.has_value(); }
 
   Settings settings_;
@@ -149,8 +168,9 @@ class ProcessModel {
   bool begun_ = false;  // the numbers have been made of readings
   InputTable points_;   // as the kernel describes them
   Eigen::VectorXd values_, ages_;
-  Eigen::VectorXd scatter_;  // that the variance of each is multiplied by
-  Eigen::VectorXd weighed_;  // the same by what the last fit left of each, for the next one
+  Eigen::VectorXd scatter_;   // that the variance of each is multiplied by
+  Eigen::VectorXd weighed_;   // the same by what the last fit left of each, for the next one
+  Eigen::VectorXd averaged_;  // how many readings each is the mean of
   Numbers numbers_;
   std::optional<double> settled_bend_{};  // logarithm, as the first readings gave it
   // Made anew of the above where readings or numbers have changed.
@@ -163,7 +183,7 @@ class ProcessModel {
   Eigen::VectorXd weights_, small_rest_, mean_of_, distance_, mean_;
   std::vector<int> order_, chosen_;
   InputTable kernels_;  // a row per point: of the readings, solved with the factor
-  InputTable asked_;
+  InputTable asked_, asked_columns_;
   Scales now_;
 };
 

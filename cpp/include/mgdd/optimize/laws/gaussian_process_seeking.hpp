@@ -23,10 +23,13 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/ask_tell/seeker.hpp"
 #include "mgdd/optimize/belief/process_model.hpp"
-#include "mgdd/optimize/limits/constraint_filter.hpp"
+#include "mgdd/optimize/laws/most_worth.hpp"
+#include "mgdd/optimize/limits/failing_process.hpp"
+#include "mgdd/optimize/limits/limit_process.hpp"
 #include "mgdd/optimize/watch/causing_inputs.hpp"
 #include "mgdd/optimize/watch/delay_finder.hpp"
 #include "mgdd/optimize/watch/lag_window.hpp"
+#include "mgdd/optimize/watch/surprise.hpp"
 
 namespace mgdd::optimize {
 
@@ -112,9 +115,7 @@ class GaussianProcessSeeking {
   void require_usable() const {
     require_within_space("estimate", estimate_, settings_.space);
     require_within_space("applied", applied_, settings_.space);
-    require_in(closed(0.0, 1e12), "cycles_seen", seen_);
-    require_in(closed(0.0, seen_), "cycles_failed", failed_);
-    require_in(closed(least_anywhere, -least_anywhere), "anywhere", anywhere_);
+    failing_.require_usable();
   }
 
   template <class Self, class V>
@@ -131,16 +132,13 @@ class GaussianProcessSeeking {
     v("rested", self.rested_, counts_end);
     v("since_failure", self.since_failure_, counts_end);
     v("wary", self.wary_, counts_end);
-    v("cycles_seen", self.seen_);
-    v("cycles_failed", self.failed_);
-    v("anywhere", self.anywhere_);
     v("expected", self.expected_);
     v("expected_sd", self.expected_sd_);
-    v("surprise", self.surprise_);
+    for (std::size_t i = 0; i < self.surprise_.size(); ++i)
+      Surprise::visit(self.surprise_[i], v, "surprise" + std::to_string(i));
     v("since_doubt", self.since_doubt_, counts_end);
     v("doubts", self.doubts_, counts_end);
     v("limit_room", self.room_);
-    v("limit_logarithm", self.logarithm_);
     v("limit_unsafe", self.unsafe_);
     CausingInputs::visit(self.causes_, v, "cause");
     for (std::size_t i = 0; i < self.finders_.size(); ++i)
@@ -150,16 +148,15 @@ class GaussianProcessSeeking {
     for (std::size_t i = 0; i < self.j_.size(); ++i)
       ProcessModel::visit(self.j_[i], v, i == 0 ? "j" : "j" + std::to_string(i));
     for (std::size_t i = 0; i < self.limited_.size(); ++i)
-      ProcessModel::visit(self.limited_[i], v, "limit" + std::to_string(i));
-    ProcessModel::visit(self.failing_, v, "failing");
+      LimitProcess::visit(self.limited_[i], v, "limit" + std::to_string(i));
+    FailingProcess::visit(self.failing_, v);
   }
 
  private:
   static constexpr int far_candidates = 8, near_candidates = 47, candidates = 2 + far_candidates + near_candidates;
-  static constexpr double active_room = 0.05;     // scales of a limit
-  static constexpr std::int64_t least_wary = 2;   // cycles that work, after a failure
-  static constexpr double least_anywhere = -3.0;  // a region that fails is to be taken seriously first
-  static constexpr int most_on_their_way = 8;     // inputs whose readings have not come, that are counted on
+  static constexpr double active_room = 0.05;    // scales of a limit
+  static constexpr std::int64_t least_wary = 2;  // cycles that work, after a failure
+  static constexpr int most_on_their_way = 8;    // inputs whose readings have not come, that are counted on
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
@@ -177,24 +174,15 @@ class GaussianProcessSeeking {
   bool guided() const noexcept;
   void draw_candidates() noexcept;
   double dither() const noexcept;
-  bool failures_known() const noexcept {
-    return failing_.count_above(0.0) > 0 && failing_.count() >= failing_.fewest();
-  }
-  void judge_failures(int points) noexcept;
-  void watch_failures(const Inputs& z, bool worked) noexcept;
   void judge(double likely, double mean, int point) noexcept;
   void judge_safety(int points, double quantile) noexcept;
   void keep_safe(int points, double quantile) noexcept;
   bool pull_back(int points) noexcept;
   void know_edge(const Inputs& at) noexcept;
-  double multiply(const Inputs& rise, const Inputs& at) noexcept;
   double side_step() const noexcept;
-  double student(const ProcessModel& model) const noexcept;
-  double excess(std::size_t i, int point, double quantile) const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;
   int most_along(int safe) const noexcept;
-  void learn_limit(std::size_t i, const Inputs& z, double value, const Inputs& about) noexcept;
   void explore(const Inputs& z) noexcept;
   void send(const Inputs& z) noexcept;
 
@@ -206,8 +194,8 @@ class GaussianProcessSeeking {
   std::vector<DelayFinder> finders_;  // of the components
   std::vector<LagWindow> windows_;    // of the components, then of the limits
   std::vector<ProcessModel> j_;       // of its components
-  std::vector<ProcessModel> limited_;
-  ProcessModel failing_;  // -1 where a cycle worked, 1 where it failed
+  std::vector<LimitProcess> limited_;
+  FailingProcess failing_;
   Inputs estimate_, applied_;
   Inputs middle_;            // the start, scaled
   Inputs good_;              // the input that worked last, scaled
@@ -215,22 +203,20 @@ class GaussianProcessSeeking {
   std::int64_t star_ = 0;    // first readings asked for
   std::int64_t held_ = 0;
   std::int64_t since_failure_ = 0, wary_ = least_wary;  // cycles; so many of them nothing is asked that may fail
-  double seen_ = 0.0, failed_ = 0.0;                    // cycles, fading
-  double anywhere_ = least_anywhere;  // logarithm of how much likelier cycles fail anywhere than by their input
-  std::int64_t rested_ = 0;           // inputs in a row that stayed at the estimate
+  std::int64_t rested_ = 0;                             // inputs in a row that stayed at the estimate
   double expected_ = 0.0, expected_sd_ = 0.0;
-  std::vector<double> surprise_;  // running means of squared normalised innovations, of the components
+  std::vector<Surprise> surprise_;  // of the components
   std::int64_t since_doubt_ = 0, doubts_ = 0;
-  std::vector<double> room_;       // of every limit at the estimate, in its scale
-  std::vector<double> logarithm_;  // 1 where a limit is learnt by it
-  std::vector<double> unsafe_;     // cycles in a row in which no input was safe
+  std::vector<double> room_;    // of every limit at the estimate, in its scale
+  std::vector<double> unsafe_;  // cycles in a row in which no input was safe
   // Scratch.
   InputTable candidates_, edges_;  // slopes of every limit in its scale at the estimate
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
-  std::vector<double> worth_mean_, effect_, breaks_, over_, mean_over_;
+  std::vector<double> effect_, over_, mean_over_;
   std::vector<double> excess_, multipliers_, credit_;  // of every limit at the candidates; J per scale of a limit
   std::vector<int> order_;
+  WorthScratch worth_;
 };
 
 }  // namespace mgdd::optimize

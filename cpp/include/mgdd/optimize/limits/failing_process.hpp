@@ -1,0 +1,70 @@
+// What a Gaussian process knows of where cycles fail: of their labels, -1 where one worked, 1 where it failed; and
+// whether they fail by their input at all, or anywhere. noexcept and allocation-free after construction.
+#pragma once
+
+#include <algorithm>
+#include <string>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/optimize/ask_tell/reading.hpp"
+#include "mgdd/optimize/belief/process_model.hpp"
+
+namespace mgdd::optimize {
+
+class FailingProcess {
+ public:
+  /// `settings` of a process of J over the same inputs.
+  explicit FailingProcess(ProcessModel::Settings settings);
+
+  void record(const Inputs& z, bool worked, const Inputs& about) noexcept;
+  void fit(const Inputs& about) noexcept {
+    if (known()) model_.fit(about);
+  }
+  void forget() noexcept;
+  void reseed(std::uint64_t seed) noexcept { model_.reseed(seed); }
+  bool seen_one() const noexcept { return model_.count_above(0.0) > 0; }
+  /// Whether cycles have failed, and more likely by their input than anywhere.
+  bool by_input() const noexcept { return known() && anywhere_ <= 0.0; }
+
+  /// Predicts at the first `points` rows; `judge(excess, mean, point)` takes by how much a point is likelier to fail
+  /// than may be asked. All of them may fail, as where cycles fail at random: then the least likely ones may be asked.
+  template <class Judge>
+  void judge(const InputTable& at, int points, bool wary, const Judge& judge) noexcept {
+    model_.predict(at, points);
+    const auto likely = [&](int p) { return model_.mean(p) + quantile * model_.sd(p); };
+    double least = largest_reading;
+    for (int p = 0; p < points; ++p)
+      least = std::min(least, likely(p));
+    const double most = std::max(wary ? wary_failing : most_failing, least + (wary ? wary_room : failing_room));
+    for (int p = 0; p < points; ++p)
+      judge(likely(p) - most, model_.mean(p), p);
+  }
+
+  void require_usable() const {
+    require_in(closed(0.0, 1e12), "cycles_seen", seen_);
+    require_in(closed(0.0, seen_), "cycles_failed", failed_);
+    require_in(closed(least_anywhere, -least_anywhere), "anywhere", anywhere_);
+  }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("cycles_seen", self.seen_);
+    v("cycles_failed", self.failed_);
+    v("anywhere", self.anywhere_);
+    ProcessModel::visit(self.model_, v, "failing");
+  }
+
+ private:
+  static constexpr double quantile = 2.0;                           // of the label
+  static constexpr double most_failing = 0.0, wary_failing = -0.5;  // that is asked for, and after a failure
+  static constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may exceed the least one
+  static constexpr double least_anywhere = -3.0;  // a region that fails is to be taken seriously first
+  bool known() const noexcept { return seen_one() && model_.count() >= model_.fewest(); }
+
+  ProcessModel model_;
+  InputTable here_;                   // scratch
+  double seen_ = 0.0, failed_ = 0.0;  // cycles, fading
+  double anywhere_ = least_anywhere;  // logarithm of how much likelier cycles fail anywhere than by their input
+};
+
+}  // namespace mgdd::optimize

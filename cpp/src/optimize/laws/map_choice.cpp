@@ -1,0 +1,279 @@
+// Where a map is read next, and what it says.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/optimize/belief/row_cholesky.hpp"
+#include "mgdd/optimize/laws/map_seeking.hpp"
+#include "mgdd/optimize/laws/process_laws.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr double promising = 2.0;   // standard deviations
+constexpr double first_room = 0.1;  // scales of a limit that a guide leaves free at the first visit
+constexpr int first_draws = 400;
+constexpr double first_step = 0.1;  // ranges
+constexpr std::uint64_t regret_samples = 32;
+constexpr double least_pivot = 1e-6;   // of the largest variance
+constexpr double least_effect = 1e-9;  // of a standard deviation
+
+}  // namespace
+
+// The largest J by the guide with room to its limits, or the start.
+Inputs MapSeeking::first_input(const Inputs& context) const noexcept {
+  Inputs best = scaled(settings_.space.start);
+  if (settings_.guide.empty()) return best;
+  Inputs at(context_ + inputs_);
+  at.head(context_) = context;
+  double most = -std::numeric_limits<double>::infinity(), least_over = -most;
+  for (int p = 0; p < first_draws; ++p) {
+    Inputs z(inputs_);
+    for (Eigen::Index i = 0; i < inputs_; ++i)
+      z[i] = random::uniform(settings_.seed, 430 + static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(p));
+    z = settable(z);
+    at.tail(inputs_) = unscaled(z);
+    double over = 0.0;
+    for (std::size_t i = 0; i < settings_.limit_guides.size(); ++i) {
+      if (settings_.limit_guides[i].empty()) continue;
+      const Limit& limit = settings_.limits[i];
+      over = std::max(over, (settings_.limit_guides[i](at) + limit.margin - limit.upper) / limit.scale + first_room);
+    }
+    const double j = (settings_.maximize ? 1.0 : -1.0) * settings_.guide[0](at);
+    if (over > least_over || (over == least_over && j <= most)) continue;
+    most = j;
+    least_over = over;
+    best = z;
+  }
+  return best;
+}
+
+// At the point in the middle; without a guide then a step of every input there, and the farthest points to the sides.
+void MapSeeking::first_visit() noexcept {
+  const auto cells_of = all_cells();
+  const auto middle = std::ranges::min_element(
+      cells_of, {}, [](const Place& place) { return (place.context.array() - 0.5).matrix().squaredNorm(); });
+  std::size_t at = static_cast<std::size_t>(middle - cells_of.begin());
+  Inputs z = first_input(unscaled_context(middle->context));
+  const auto side = static_cast<Eigen::Index>(told_ % (1 + context_ + inputs_)) - 1;
+  if (side >= 0 && side < inputs_) {
+    z[side] += z[side] > 0.5 ? -first_step : first_step;
+  } else if (side >= inputs_) {
+    double farthest = 0.0;
+    for (std::size_t c = 0; c < cells(); ++c) {
+      const Inputs off = (places_[c].context - middle->context).cwiseAbs();
+      const double along = off[side - inputs_];
+      if (off.sum() > along || along <= farthest) continue;
+      farthest = along;
+      at = c;
+    }
+  }
+  visit_ = {cell(at), unscaled(settable(z))};
+}
+
+// The best input of a cell, the most promising one, the least known one, those at the ends, and some from everywhere.
+int MapSeeking::visits_of(std::size_t c, std::span<int> out) const noexcept {
+  const int from = static_cast<int>(c) * per_place;
+  std::size_t count = 0;
+  const auto take = [&](int p) {
+    const auto taken = out.first(count);
+    if (p >= 0 && count < out.size() && std::ranges::find(taken, p) == taken.end()) out[count++] = p;
+  };
+  int promise = -1, widest = -1, first = -1, last = -1;
+  double most = 0.0, wide = 0.0;
+  for (int p = from; p < from + per_place; ++p) {
+    if (!safe(p, places_[c])) continue;
+    const double sd = j_.sd(p), hope = j_.mean(p) + promising * sd;
+    if (promise < 0 || hope > most) {
+      most = hope;
+      promise = p;
+    }
+    if (widest < 0 || sd > wide) {
+      wide = sd;
+      widest = p;
+    }
+    if (first < 0 || candidates_(p, context_) < candidates_(first, context_)) first = p;
+    if (last < 0 || candidates_(p, context_) > candidates_(last, context_)) last = p;
+  }
+  if (promise < 0) return 0;
+  if (safe(from, places_[c])) take(from);
+  for (const int p : {promise, widest, first, last})
+    take(p);
+  for (int k = 0; k < per_place; ++k) {
+    const int p = from + static_cast<int>(uniform(440, from + k) * per_place);
+    if (safe(p, places_[c])) take(p);
+  }
+  return static_cast<int>(count);
+}
+
+// By what a reading at a candidate is expected to raise the J of all cells.
+double MapSeeking::gain_of(int point) noexcept {
+  const double sd = std::hypot(j_.sd(point), j_.noise_sd() / std::sqrt(settings_.averaged));
+  if (!(sd > 0.0)) return 0.0;
+  j_.covariances(point, static_cast<int>(cells()) * per_place, effect_.data());
+  double out = 0.0;
+  for (std::size_t c = 0; c < cells(); ++c) {
+    const auto from = static_cast<std::size_t>(safe_from_[c]), n = static_cast<std::size_t>(safe_from_[c + 1]) - from;
+    const std::span<double> means(worth_.mean.data(), n), effects(worth_.effect.data(), n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const int p = safe_[from + k];
+      means[k] = j_.mean(p);
+      effects[k] = effect_[static_cast<std::size_t>(p)] / sd;
+    }
+    const auto [least, most] = std::ranges::minmax(effects);
+    if (most - least < least_effect * sd) continue;
+    out += knowledge_gradient(means, effects, {worth_.order.data(), n}, {worth_.breaks.data(), n});
+  }
+  for (std::size_t i = 0; i < limited_.size(); ++i) {
+    const ProcessModel& model = limited_[i].model();
+    const double reading = std::pow(model.sd(point), 2.0) + std::pow(model.noise_sd(), 2.0) / settings_.averaged;
+    if (!(reading > 0.0)) continue;
+    for (std::size_t c = 0; c < cells(); ++c) {
+      const double multiplier = multipliers_[c * limited_.size() + i];
+      if (!(multiplier > 0.0)) continue;
+      const int best = static_cast<int>(c) * per_place;
+      const double doubt = model.sd(best), both = model.covariance(best, point);
+      if (!(doubt > 0.0)) continue;
+      const double left = std::sqrt(std::max(1.0 - both * both / (reading * doubt * doubt), 0.0));
+      out += multiplier * quantile_ * limited_[i].sd(best) * (1.0 - left);
+    }
+  }
+  return out;
+}
+
+const MapSeeking::Visit& MapSeeking::suggest() noexcept {
+  if (cells() == 0) return visit_;
+  if (!known()) {
+    first_visit();
+    return visit_;
+  }
+  know_cells();
+  double most = -1.0;
+  int next = -1;
+  for (std::size_t c = 0; c < cells(); ++c) {
+    std::array<int, most_visits> visits{};
+    const int count = visits_of(c, visits);
+    const bool elsewhere = (cell(c) - last_context_).cwiseAbs().maxCoeff() > 0.0;
+    for (int k = 0; k < count; ++k) {
+      const int p = visits[static_cast<std::size_t>(k)];
+      const double gain = gain_of(p), worth = elsewhere ? gain / (1.0 + settings_.moving_cost) : gain;
+      if (worth <= most) continue;
+      most = worth;
+      next = p;
+      visit_.gain = gain;
+    }
+  }
+  if (next < 0) {
+    next = least_unsafe(all_cells());
+    visit_.gain = 0.0;
+  }
+  visit_.sd = j_.sd(next);
+  visit_.context = unscaled_context(candidates_.row(next).head(context_).transpose());
+  visit_.input = unscaled(candidates_.row(next).tail(inputs_).transpose());
+  return visit_;
+}
+
+const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
+  Place& here = places_.back();
+  const Inputs at = scaled_context(context);
+  if (!known()) {
+    Inputs z = first_input(context);
+    const auto side = static_cast<Eigen::Index>(told_ % (1 + inputs_)) - 1;
+    if (side >= 0) z[side] += z[side] > 0.5 ? -first_step : first_step;
+    asked_ = unscaled(settable(z));
+    return asked_;
+  }
+  // From the best of the nearest cell at another point.
+  if ((at - here.context).cwiseAbs().maxCoeff() > 0.0 && cells() > 0) {
+    here.best = std::ranges::min_element(all_cells(), {}, [&](const Place& place) {
+                  return (place.context - at).squaredNorm();
+                })->best;
+  }
+  here.context = at;
+  const std::span<Place> places(&here, 1);
+  search(places);
+  searched_ = false;
+  int count = 0;
+  for (int p = 0; p < per_place; ++p) {
+    if (safe(p, here)) safe_[static_cast<std::size_t>(count++)] = p;
+  }
+  int next = 0;
+  if (count == 0) {
+    next = least_unsafe(places);
+  } else {
+    for (int p = 0; p < per_place; ++p)
+      j_.covariances(p, per_place, &joint_(p, 0));
+    const double noise = std::max(j_.noise_sd(), worth_noise * std::abs(j_.mean(0)));
+    const double read = static_cast<double>(j_.count()) / (cautious_readings * static_cast<double>(1 + inputs_));
+    next = most_worth(
+        {safe_.data(), static_cast<std::size_t>(count)}, [this](int p) { return j_.mean(p); },
+        [this](int p, int q) { return joint_(p, q); }, noise, settings_.horizon * std::min(1.0, read), worth_);
+  }
+  asked_ = unscaled(candidates_.row(next).tail(inputs_).transpose());
+  return asked_;
+}
+
+// Regret and place by samples of J at the candidates of a cell that keep its limits.
+void MapSeeking::sample(std::size_t c, Best& out) noexcept {
+  const std::span<const int> kept(&safe_[static_cast<std::size_t>(safe_from_[c])],
+                                  static_cast<std::size_t>(safe_from_[c + 1] - safe_from_[c]));
+  const auto n = static_cast<Eigen::Index>(kept.size());
+  const auto at = [&](Eigen::Index k) { return kept[static_cast<std::size_t>(k)]; };
+  double widest = 0.0;
+  for (Eigen::Index a = 0; a < n; ++a) {
+    for (Eigen::Index b = 0; b <= a; ++b)
+      joint_(a, b) = j_.covariance(at(a), at(b));
+    widest = std::max(widest, joint_(a, a));
+  }
+  if (!(widest > 0.0)) return;
+  for (Eigen::Index a = 0; a < n; ++a)
+    joint_(a, a) = std::max(joint_(a, a), 0.0) + least_pivot * widest;
+  cholesky(joint_, n);
+  Inputs squares = Inputs::Zero(inputs_);
+  for (std::uint64_t s = 0; s < regret_samples; ++s) {
+    for (Eigen::Index k = 0; k < n; ++k)
+      worth_.effect[static_cast<std::size_t>(k)] =
+          random::normal(settings_.seed, 450 + s, static_cast<std::uint64_t>(k));
+    double most = 0.0, own = 0.0;
+    Eigen::Index best = 0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double value = j_.mean(at(k)) + dot(&joint_(k, 0), worth_.effect.data(), k + 1);
+      if (k == 0) own = most = value;
+      if (value <= most) continue;
+      most = value;
+      best = k;
+    }
+    out.regret += (most - own) / regret_samples;
+    const Inputs off = candidates_.row(at(best)).tail(inputs_).transpose() - places_[c].best;
+    squares += off.cwiseAbs2() / regret_samples;
+  }
+  out.input_sd = squares.cwiseSqrt().cwiseProduct(settings_.space.upper - settings_.space.lower);
+}
+
+MapSeeking::Best MapSeeking::best(std::size_t c) noexcept {
+  if (!known()) return {unscaled(first_input(cell(c))), settings_.space.upper - settings_.space.lower};
+  know_cells();
+  const int at = static_cast<int>(c) * per_place;
+  const double expected = (settings_.maximize ? 1.0 : -1.0) * j_.mean(at);
+  Best out{unscaled(places_[c].best), Inputs::Zero(inputs_), expected, j_.sd(at), 0.0, places_[c].excess};
+  sample(c, out);
+  return out;
+}
+
+void MapSeeking::know_cells() noexcept {
+  if (!searched_) search(all_cells());
+  searched_ = true;
+}
+
+double MapSeeking::holds(std::size_t c, std::size_t i) noexcept {
+  if (!known()) return 0.0;
+  know_cells();
+  const int at = static_cast<int>(c) * per_place;
+  const double sd = limited_[i].sd(at), mean = limited_[i].excess(at, 0.0);
+  return 0.5 * std::erfc(mean / (std::max(sd, 1e-300) * std::numbers::sqrt2));
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,210 @@
+// The best input of every point of a map, and the candidates that its worth is reckoned with.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/optimize/laws/map_seeking.hpp"
+#include "mgdd/optimize/laws/process_laws.hpp"
+#include "mgdd/optimize/limits/multipliers.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr int map_rounds = 6;
+constexpr double map_width = 0.1, map_shrinks = 0.5;  // ranges, per round
+constexpr double likely_quantile = 1.0;               // of what is asked where nothing is safe
+constexpr double reach_beyond_read = 2.0;             // reaches
+constexpr std::uint64_t draws_per_reading = 1'000'003;
+
+}  // namespace
+
+double MapSeeking::uniform(std::uint64_t stream, int index) const noexcept {
+  const auto place = static_cast<std::uint64_t>(told_) * draws_per_reading + static_cast<std::uint64_t>(index);
+  return random::uniform(settings_.seed, stream, place);
+}
+double MapSeeking::normal(std::uint64_t stream, int index) const noexcept {
+  const auto place = static_cast<std::uint64_t>(told_) * draws_per_reading + static_cast<std::uint64_t>(index);
+  return random::normal(settings_.seed, stream, place);
+}
+
+void MapSeeking::put(int row, const Inputs& context, const Inputs& z) noexcept {
+  candidates_.row(row).head(context_) = context.transpose();
+  candidates_.row(row).tail(inputs_) = settable(z).transpose();
+}
+
+// The largest excess of any limit, in its scale, of every candidate: for the map, for what is asked, and where nothing
+// is safe.
+void MapSeeking::judge(int points) noexcept {
+  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_})
+    std::fill_n(one->begin(), points, -largest_reading);
+  for (LimitProcess& limited : limited_) {
+    limited.model().predict(candidates_, points);
+    for (int p = 0; p < points; ++p) {
+      const auto at = static_cast<std::size_t>(p);
+      const double mean = limited.excess(p, 0.0), sd = limited.sd(p);
+      over_[at] = std::max(over_[at], mean + quantile_ * sd);
+      cautious_[at] = std::max(cautious_[at], mean + cautious_quantile_ * sd);
+      mean_over_[at] = std::max(mean_over_[at], mean + likely_quantile * sd / limited.widening());
+    }
+  }
+  if (!failing_.by_input()) return;
+  failing_.judge(candidates_, points, since_failure_ == 0, [this](double likely, double mean, int p) {
+    const auto at = static_cast<std::size_t>(p);
+    over_[at] = std::max(over_[at], likely);
+    cautious_[at] = std::max(cautious_[at], likely);
+    mean_over_[at] = std::max(mean_over_[at], mean);
+  });
+}
+
+// Of a place's points the one with the largest mean that keeps the limits, or the least unsafe one.
+void MapSeeking::keep_best(Place& place, int from, int count) noexcept {
+  int best = from;
+  for (int p = from + 1; p < from + count; ++p) {
+    const auto own = static_cast<std::size_t>(p), known = static_cast<std::size_t>(best);
+    const bool safe = over_[own] <= 0.0, was = over_[known] <= 0.0;
+    const bool better = safe != was ? safe : safe ? j_.mean(p) > j_.mean(best) : over_[own] < over_[known];
+    if (better) best = p;
+  }
+  place.best = candidates_.row(best).tail(inputs_).transpose();
+  place.excess = over_[static_cast<std::size_t>(best)];
+}
+
+// Of every place its best input, some from everywhere, and a cloud around the best at distances of all sizes.
+void MapSeeking::scatter(std::span<const Place> places) noexcept {
+  int row = 0;
+  for (const Place& place : places) {
+    put(row++, place.context, place.best);
+    for (int p = 0; p < spread; ++p, ++row) {
+      Inputs z(inputs_);
+      for (Eigen::Index i = 0; i < inputs_; ++i)
+        z[i] = uniform(400 + static_cast<std::uint64_t>(i), row);
+      z[0] = (p + z[0]) / spread;
+      put(row, place.context, z);
+    }
+    for (int p = 0; p < near; ++p, ++row) {
+      const double distance = cloud_nearest * std::pow(cloud_farthest / cloud_nearest, (p + 0.5) / near);
+      Inputs z = place.best;
+      for (Eigen::Index i = 0; i < inputs_; ++i)
+        z[i] += distance * normal(410 + static_cast<std::uint64_t>(i), row);
+      put(row, place.context, z);
+    }
+  }
+  judge(row);
+  j_.predict(candidates_, row);
+}
+
+void MapSeeking::search(std::span<Place> places) noexcept {
+  scatter(places);
+  int from = 0;
+  for (Place& place : places) {
+    keep_best(place, from, per_place);
+    from += per_place;
+  }
+  double width = map_width;
+  for (int round = 0; round < map_rounds; ++round, width *= map_shrinks) {
+    int row = 0;
+    for (const Place& place : places) {
+      put(row++, place.context, place.best);
+      for (int p = 1; p < cloud; ++p, ++row) {
+        Inputs z = place.best;
+        for (Eigen::Index i = 0; i < inputs_; ++i)
+          z[i] += width * normal(420 + static_cast<std::uint64_t>(max_inputs * round + i), row);
+        put(row, place.context, z);
+      }
+    }
+    judge(row);
+    j_.predict_means(candidates_, row);
+    from = 0;
+    for (Place& place : places) {
+      keep_best(place, from, cloud);
+      from += cloud;
+    }
+  }
+  know_edges(places);
+  scatter(places);
+  choose_safe(places);
+}
+
+// What J of a place would gain by each limit that holds its best input back, were it wider by its scale.
+void MapSeeking::know_edges(std::span<const Place> places) noexcept {
+  if (limited_.empty()) return;
+  const int n = static_cast<int>(inputs_), own = 1 + 2 * n;
+  static_assert(1 + 2 * max_inputs <= per_place);
+  int row = 0;
+  for (const Place& place : places) {
+    put(row++, place.context, place.best);
+    for (int k = 0; k < n; ++k) {
+      for (const double side : {slope_step, -slope_step}) {
+        candidates_.row(row) = candidates_.row(row - 1 - (side > 0.0 ? 2 * k : 2 * k + 1));
+        candidates_(row, context_ + k) = std::clamp(place.best[k] + side, 0.0, 1.0);
+        ++row;
+      }
+    }
+  }
+  judge(row);
+  j_.predict_means(candidates_, row);
+  row = 0;
+  for (std::size_t c = 0; c < places.size(); ++c, row += own) {
+    Inputs rise(inputs_);
+    const auto slope = [&](const ProcessModel& model, int k) {
+      const int up = row + 1 + 2 * k;
+      return (model.mean(up) - model.mean(up + 1)) /
+             (candidates_(up, context_ + k) - candidates_(up + 1, context_ + k));
+    };
+    for (int k = 0; k < n; ++k) {
+      rise[k] = slope(j_, k);
+      for (std::size_t i = 0; i < limited_.size(); ++i)
+        edges_(static_cast<Eigen::Index>(i), k) = slope(limited_[i].model(), k) / settings_.limits[i].scale;
+    }
+    multipliers(
+        rise, places[c].best, edges_, [&](std::size_t i) { return limited_[i].excess(row, quantile_) > -active_room; },
+        std::span(multipliers_).subspan(c * limited_.size(), limited_.size()));
+  }
+}
+
+// The candidates of every place that keep its limits, the best one among them in any case. Where none does, less doubt
+// about its limits is worth what J ranges over.
+void MapSeeking::choose_safe(std::span<const Place> places) noexcept {
+  int count = 0;
+  for (std::size_t c = 0; c < places.size(); ++c) {
+    safe_from_[c] = count;
+    const int from = static_cast<int>(c) * per_place;
+    double low = j_.mean(from), high = low;
+    for (int p = from; p < from + per_place; ++p) {
+      low = std::min(low, j_.mean(p));
+      high = std::max(high, j_.mean(p));
+      if (p == from || over_[static_cast<std::size_t>(p)] <= 0.0) safe_[static_cast<std::size_t>(count++)] = p;
+    }
+    if (over_[static_cast<std::size_t>(from)] <= 0.0) continue;
+    for (std::size_t i = 0; i < limited_.size(); ++i)
+      multipliers_[c * limited_.size() + i] = high - low;
+  }
+  safe_from_[places.size()] = count;
+}
+
+// Whether a candidate may be asked; with limits not far from what was read, nor from the best of its place.
+bool MapSeeking::safe(int point, const Place& place) const noexcept {
+  if (cautious_[static_cast<std::size_t>(point)] > 0.0) return false;
+  if (limited_.empty()) return true;
+  const Inputs z = candidates_.row(point).tail(inputs_).transpose();
+  const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
+  return beyond <= reach_beyond_read * settings_.reach && (z - place.best).cwiseAbs().maxCoeff() <= settings_.reach;
+}
+
+// Where nothing is safe: not far from what was read, the one that most likely keeps its limits.
+int MapSeeking::least_unsafe(std::span<const Place> places) const noexcept {
+  int best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int p = 0; p < static_cast<int>(places.size()) * per_place; ++p) {
+    const Inputs z = candidates_.row(p).tail(inputs_).transpose();
+    const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
+    const double own = mean_over_[static_cast<std::size_t>(p)];
+    if (beyond > reach_beyond_read * settings_.reach || own >= least) continue;
+    least = own;
+    best = p;
+  }
+  return best;
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,244 @@
+"""Result of a search for a map: the maps, what is known of each cell, every visit, and reasons to doubt it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+
+from mgdd.errors import ParameterError
+from mgdd.loop.lower_limits import plain_name
+from mgdd.maps import CalibrationMap
+from mgdd.maps.cells import MapTask
+from mgdd.optimize.inputs import unit_of_input
+from mgdd.results.describe import Row
+from mgdd.results.finding import Finding, findings_html
+from mgdd.results.labels import labelled_dataset, named_label
+from mgdd.results.result import Result, merged
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from mgdd.optimize.map_seeking import MapSeeking
+
+_NOTHING = 0.3  # share of the guide below which it explains as good as nothing
+_HELD = 0.02  # shares of a limit: nearer than that it holds the cell back
+
+
+class Visit(NamedTuple):
+    """One visit: where, and what was read there.
+
+    Parameters
+    ----------
+    at, inputs : dict of str to float
+        Operating point, and inputs as they were really applied.
+    j : float
+        Mean of J; NaN where the visit failed.
+    limits : dict of str to float
+        Means of the limited quantities.
+    readings : float
+        Cycles behind them.
+    failed : bool
+        Half of the cycles or more failed.
+    """
+
+    at: dict[str, float]
+    inputs: dict[str, float]
+    j: float
+    limits: dict[str, float]
+    readings: float
+    failed: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MapSearch(Result):
+    """What `seek_map` has found.
+
+    Attributes
+    ----------
+    maps : mapping of str to CalibrationMap
+        The best of every input; cells hold ``sd``, ``objective``, ``support`` (visits), ``regret``, the limit that
+        holds them, and ``holds_NAME``, the probability of each limit.
+    cells : xarray.Dataset
+        All of it over the axes, as `MapSeeking.cells`.
+    visits : tuple of Visit
+        In their order.
+    findings : tuple of Finding
+        Reasons to doubt the map.
+    seeker : MapSeeking
+        Goes on where the search ended: ``seek_map(plant, ..., seeker=found.seeker)``, or ``seeker.ask(point)`` as the
+        engine is driven.
+    """
+
+    cells: xr.Dataset
+    visits: tuple[Visit, ...]
+    maps: Mapping[str, CalibrationMap]
+    findings: tuple[Finding, ...]
+    seeker: MapSeeking
+
+    @classmethod
+    def of(
+        cls, seeker: MapSeeking, visits: Sequence[Visit], *, tolerance: float | None, interrupted: bool
+    ) -> Self:
+        """Read the map of a seeker."""
+        cells = seeker.cells()
+        findings = tuple(_doubts(seeker, cells, visits, tolerance, interrupted=interrupted))
+        return cls(
+            cells=cells, visits=tuple(visits), maps=_maps(seeker, cells, visits), findings=findings, seeker=seeker
+        )
+
+    @property
+    def map(self) -> CalibrationMap:
+        """The map of the only input; ParameterError where there are several, or more than two axes."""
+        if len(self.maps) != 1:
+            have = ", ".join(self.maps) or "none: a CalibrationMap has one or two axes"
+            raise ParameterError(f"map: there are several, {have}: take one from .maps")
+        return next(iter(self.maps.values()))
+
+    @property
+    def regret(self) -> float:
+        """By how much J of the true best is expected to be above that of the map, mean of the cells [unit of J]."""
+        return float(self.cells["regret"].mean())
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The cells over the axes, and the visits over ``visit``."""
+        own = self.seeker.settings
+        columns: dict[str, Any] = {"visit": ("visit", np.arange(1, len(self.visits) + 1), "-", "visit")}
+        for name in self.seeker.axes:
+            columns[f"visit_{name}"] = ("visit", [one.at[name] for one in self.visits], *named_label(name))
+        for one in own["inputs"]:
+            values = [each.inputs[one.name] for each in self.visits]
+            columns[f"visit_{one.name}"] = ("visit", values, unit_of_input(one), named_label(one.name).long_name)
+        columns["visit_j"] = ("visit", [one.j for one in self.visits], "unit of J", "objective as read")
+        for name in self.seeker.limit_names:
+            label = named_label(plain_name(name)[0])
+            columns[f"visit_{name}"] = ("visit", [one.limits[name] for one in self.visits], *label)
+        columns["visit_readings"] = ("visit", [one.readings for one in self.visits], "-", "cycles averaged")
+        columns["visit_failed"] = ("visit", [float(one.failed) for one in self.visits], "-", "whether it failed")
+        return merged(self.cells, labelled_dataset(columns))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give what matters as plain values."""
+        return {
+            "visits": len(self.visits),
+            "regret": self.regret,
+            "axes": {name: column.tolist() for name, column in self.seeker.axes.items()},
+            "inputs": {name: self.cells[name].values.tolist() for name in self.seeker.input_names},
+            "expected_j": self.cells["j"].values.tolist(),
+            "trust": self.seeker.trust,
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def _title(self) -> str:
+        size = " x ".join(f"{column.size} {name}" for name, column in self.seeker.axes.items())
+        return f"Map of {', '.join(self.seeker.input_names)} over {size}, {len(self.visits)} visits"
+
+    def _rows(self) -> list[Row]:
+        cells = self.cells["regret"]
+        rows = [("expected regret", f"{float(cells.mean()):.3g}, at most {float(cells.max()):.3g} in a cell", "unit of J")]
+        if self.seeker.settings["guide"]:
+            rows.append(("share of the guide", f"{self.seeker.trust:.2f}", "-"))
+        return [*rows, *(("finding", str(finding), "") for finding in self.findings)]
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() + findings_html("Findings", self.findings)
+
+    def _draw(self, ax: Axes | None) -> Axes:
+        from mgdd.plot import map_search
+
+        return map_search(self, ax=ax)
+
+
+def _maps(seeker: MapSeeking, cells: xr.Dataset, visits: Sequence[Visit]) -> dict[str, CalibrationMap]:
+    axes = seeker.axes
+    if len(axes) > 2:
+        return {}
+    own = seeker.settings
+    counts = _counts(axes, visits)
+    excess = cells["excess"].to_numpy()
+    known: dict[str, Any] = {
+        "objective": cells["j"].to_numpy(), "support": counts, "regret": cells["regret"].to_numpy(),
+        "active_limit": _active(cells), "source": np.where(excess > 0.0, "extrapolated", "optimised"),
+    }  # fmt: skip
+    for k, name in enumerate(seeker.limit_names):
+        known[f"holds_{name.lstrip('-')}"] = cells["holds"].to_numpy()[..., k]
+    task = MapTask(
+        objective="j", limits={limit.name: limit.upper - limit.margin for limit in own["limits"]},
+        maximize=own["maximize"],
+    )  # fmt: skip
+    return {
+        one.name: CalibrationMap(
+            axes, cells[one.name].to_numpy(), name=one.name, labels={one.name: _label(one)}, task=task,
+            cells={**known, "sd": cells[f"{one.name}_sd"].to_numpy()},
+            provenance={"from": f"search with {len(visits)} visits"},
+        )
+        for one in own["inputs"]
+    }  # fmt: skip
+
+
+def _label(one: Any) -> tuple[str, str]:
+    return unit_of_input(one), named_label(one.name).long_name
+
+
+def _counts(axes: Mapping[str, Any], visits: Sequence[Visit]) -> Any:
+    """Count the visits whose nearest cell each is."""
+    counts = np.zeros(tuple(column.size for column in axes.values()))
+    for one in visits:
+        counts[tuple(int(np.argmin(np.abs(column - one.at[name]))) for name, column in axes.items())] += 1.0
+    return counts
+
+
+def _active(cells: xr.Dataset) -> Any:
+    """Name the limit that holds each cell back, empty where none does."""
+    shape = cells["excess"].shape
+    if "holds" not in cells:
+        return np.full(shape, "")
+    least = np.argmin(cells["holds"].to_numpy(), axis=-1)
+    names = np.array([str(name) for name in cells["limit"].to_numpy()])
+    return np.where(cells["excess"].to_numpy() > -_HELD, names[least], "")
+
+
+def _doubts(
+    seeker: MapSeeking, cells: xr.Dataset, visits: Sequence[Visit], tolerance: float | None, *, interrupted: bool
+) -> list[Finding]:
+    out = list[Finding]()
+    axes = seeker.axes
+    if interrupted:
+        out.append(Finding("interrupted", (), f"ended after {len(visits)} visits", "give its seeker to go on"))
+    if not any(not one.failed for one in visits):
+        return [*out, Finding("no_reading", (), "no visit gave a reading", "look at the plant")]
+    excess = cells["excess"].to_numpy()
+    unsafe = [_where(axes, place) for place in np.argwhere(excess > 0.0)]
+    if len(unsafe) == excess.size:
+        text, remedy = "no cell has inputs that are known to keep the limits", "take more visits, or widen the bounds"
+        out.append(Finding("no_safe_input", (), text, remedy))
+    elif unsafe:
+        text = f"{len(unsafe)} cells have no inputs that are known to keep the limits: {'; '.join(unsafe[:4])}"
+        out.append(Finding("no_safe_input", tuple(unsafe), text, "take more visits, or widen the bounds there"))
+    held = _active(cells)
+    for name in seeker.limit_names:
+        if excess.size > 1 and (held == name).all():
+            text = f"{plain_name(name)[0]} holds every cell back"
+            out.append(Finding("limit_everywhere", (plain_name(name)[0],), text, "see whether its value is meant"))
+    regret = float(cells["regret"].max())
+    if tolerance is not None and regret > tolerance:
+        text = f"a cell may be short of its best by {regret:.3g}, more than {tolerance:g}"
+        out.append(Finding("not_converged", (), text, "take more visits"))
+    if seeker.settings["guide"] and seeker.trust < _NOTHING:
+        text = f"the guide explains {seeker.trust:.0%} of what was read"
+        out.append(Finding("guide_explains_nothing", (), text, "leave it out, or look at its sign and its units"))
+    if failed := sum(one.failed for one in visits):
+        text = f"{failed} of {len(visits)} visits failed"
+        out.append(Finding("failed_visits", (), text, "look at the engine there, or narrow the bounds"))
+    if seeker.doubts:
+        text = f"readings were not explained by earlier ones, {seeker.doubts} times"
+        out.append(Finding("unexplained", (), text, "look at what else changes; the newest readings count"))
+    return out
+
+
+def _where(axes: Mapping[str, Any], place: Any) -> str:
+    return ", ".join(f"{name} = {column[k]:g}" for (name, column), k in zip(axes.items(), place, strict=True))
