@@ -257,7 +257,7 @@ class MapSeeking(_core.optimize.MapSeeking):
         held = self.limit_names
         values = [0.0] * len(held)
         if not misfire:
-            given = named_values("limits", limits, held) if isinstance(limits, Mapping) else limits
+            given = _numbers("limits", limits, held) if isinstance(limits, Mapping) else limits
             values = [float(x) for x in (given if given is not None else ())]
             if J is None or not math.isfinite(J):
                 raise DataError.of("J", J, "finite; say misfire=True where the engine failed")
