@@ -83,9 +83,9 @@ def seek(
         Transport delay and time constant between the plant and J [cycles].
     components : sequence of ComponentLag, optional
         The same for every component of J, in their order.
-    guide : Curve, EngineGuide, TimingMap, or what `GaussianProcessSeeking` takes, optional
-        What a model says of J, in the unit of J; a Curve for one input, of -J where J is minimised. The last two of the
-        start of combustion.
+    guide : Curve, EngineGuide, CalibrationMap, TimingMap, or what `GaussianProcessSeeking` takes, optional
+        What a model says of J, in the unit of J; a Curve for one input, of -J where J is minimised. An EngineGuide, or
+        a map of the best timing over operating points, is of the start of combustion.
     known : DataFrame, Dataset or mapping of columns, optional
         Readings of before, in their order: a column per input and limit, and ``j``, as the Dataset of a result is. A
         row whose J is not finite failed. They are given first, to ``curve_seeking`` or ``gaussian_process_seeking``.

@@ -15,6 +15,7 @@ from mgdd.errors import ParameterError, argument, hinted
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.lower_limits import middle_of, safe_side
+from mgdd.maps import CalibrationMap
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,
@@ -168,6 +169,8 @@ def chosen(asked: Question, seeker: str | type[Seeker] = "auto") -> Choice:
     if isinstance(asked.guide, Curve) and len(asked.inputs) > 1:
         names = ", ".join(one.name for one in asked.inputs)
         raise ParameterError(f"guide = {asked.guide!r}: a Curve has one input, not {names}; give a function of them")
+    if isinstance(asked.guide, CalibrationMap) and not {one.name for one in asked.inputs} & set(asked.guide.axes):
+        asked = replace(asked, guide=TimingMap(asked.guide))
     if isinstance(asked.guide, EngineGuide | TimingMap):
         made, reason = _led(asked, seeker)
     elif seeker == "auto":

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from mgdd.errors import DataError, Error, Interrupted, ParameterError, ShapeError
-from mgdd.guide import Curve
+from mgdd.guide import Curve, TimingMap
 from mgdd.loop import Measurement, VirtualEngine, run_seeker, seek
 from mgdd.loop.seek_result import SeekResult
+from mgdd.maps import CalibrationMap
 from mgdd.optimize import GaussianProcessSeeking, Input
 
 TWO = {"soc_cad": (-25.0, 15.0), "egr": (0.0, 0.4)}
@@ -248,6 +249,21 @@ def test_a_curve_that_does_not_fit_is_doubted() -> None:
         return engine(0.05)({"soc_cad": path[max(len(path) - 5, 0)]})
 
     assert "delay" in codes(seek(late, ONE, guide=guide, delay_cycles=2))
+
+
+def test_a_map_guides_by_what_it_is_over() -> None:
+    """Over operating points it is the best timing; over the input it is J, as any function."""
+    table = CalibrationMap({"speed_rpm": [900.0, 3000.0], "fuel_mg": [6.0, 40.0]}, -9.0, name="soc_cad")
+    found, same = (
+        seek(VirtualEngine(seed=1), {"soc_cad": (-20.0, 5.0)}, guide=guide, cycles=40)
+        for guide in (table, TimingMap(table))
+    )
+    assert found.to_dict() == same.to_dict()
+    assert found.start == {"soc_cad": -9.0}
+    curve = CalibrationMap({"soc_cad": [-20.0, -6.0, 10.0]}, [50.0, 56.0, 51.0], name="efficiency_percent")
+    assert seek(engine(0.05), ONE, guide=curve, cycles=20).to_dict()["seeker"] == "GaussianProcessSeeking"
+    with pytest.raises(DataError, match="rail_bar has unit 'bar': a timing map needs"):
+        seek(VirtualEngine(), {"soc_cad": (-20.0, 5.0)}, guide=CalibrationMap(table.axes, 400.0, name="rail_bar"))
 
 
 def test_a_result_is_pickled_tabulated_and_plain() -> None:
