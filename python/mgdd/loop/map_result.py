@@ -148,9 +148,11 @@ class MapSearch(Result):
         return super()._repr_html_() + findings_html("Findings", self.findings)
 
     def _draw(self, ax: Axes | None) -> Axes:
-        from mgdd.plot import map_search
+        from mgdd.plot import map_cells
 
-        return map_search(self, ax=ax)
+        if not self.maps:
+            return super()._draw(ax)
+        return map_cells(next(iter(self.maps.values())), ax=ax)
 
 
 def _maps(seeker: MapSeeking, cells: xr.Dataset, visits: Sequence[Visit]) -> dict[str, CalibrationMap]:
@@ -164,15 +166,18 @@ def _maps(seeker: MapSeeking, cells: xr.Dataset, visits: Sequence[Visit]) -> dic
         "objective": cells["j"].to_numpy(), "support": counts, "regret": cells["regret"].to_numpy(),
         "active_limit": _active(cells), "source": np.where(excess > 0.0, "extrapolated", "optimised"),
     }  # fmt: skip
+    labels = {"regret": ("unit of J", "expected regret")}
     for k, name in enumerate(seeker.limit_names):
-        known[f"holds_{name.lstrip('-')}"] = cells["holds"].to_numpy()[..., k]
+        column = f"holds_{name.lstrip('-')}"
+        known[column] = cells["holds"].to_numpy()[..., k]
+        labels[column] = ("-", f"probability that the limit of {name.lstrip('-')} holds")
     task = MapTask(
         objective="j", limits={limit.name: limit.upper - limit.margin for limit in own["limits"]},
         maximize=own["maximize"],
     )  # fmt: skip
     return {
         one.name: CalibrationMap(
-            axes, cells[one.name].to_numpy(), name=one.name, labels={one.name: _label(one)}, task=task,
+            axes, cells[one.name].to_numpy(), name=one.name, labels={one.name: _label(one), **labels}, task=task,
             cells={**known, "sd": cells[f"{one.name}_sd"].to_numpy()},
             provenance={"from": f"search with {len(visits)} visits"},
         )
