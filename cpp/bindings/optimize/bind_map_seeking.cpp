@@ -49,6 +49,9 @@ void bind_map_seeking(py::module_& m) {
             return input_array(b.use()->ask(at));
           },
           arg("context"), "Input of the next reading at a point.")
+      .def_property_readonly(
+          "_estimate", [](const BoundMap& b) { return input_array(b.use()->estimate()); },
+          "Best input at the point of the last _ask, as it was known then.")
       .def(
           "_tell",
           [](BoundMap& b, const InputArray& context, const InputArray& input, double j,

@@ -21,12 +21,14 @@ from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import seek
 from mgdd.loop.seek_front import seek_front
+from mgdd.loop.seek_map import seek_map
 from mgdd.loop.summary import LoopCriteria
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
 from mgdd.loop.virtual_engine import VirtualEngine
+from mgdd.loop.virtual_test_bed import VirtualTestBed
 from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.throttle.sensors import ThrottleFault
 
@@ -41,11 +43,13 @@ __all__ = [
     "SurrogatePlant",
     "ThrottleFault",
     "VirtualEngine",
+    "VirtualTestBed",
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",
     "seek",
     "seek_front",
+    "seek_map",
     "simulate_drive",
     "track",
     "track_many",

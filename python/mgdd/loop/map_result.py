@@ -61,7 +61,7 @@ class MapSearch(Result):
     ----------
     maps : mapping of str to CalibrationMap
         The best of every input; cells hold ``sd``, ``objective``, ``support`` (visits), ``regret``, the limit that
-        holds them, and ``holds_NAME``, the probability of each limit.
+        holds them, and ``NAME_holds``, the probability of each limit.
     cells : xarray.Dataset
         All of it over the axes, as `MapSeeking.cells`.
     visits : tuple of Visit
@@ -139,10 +139,11 @@ class MapSearch(Result):
 
     def _rows(self) -> list[Row]:
         cells = self.cells["regret"]
-        rows = [("expected regret", f"{float(cells.mean()):.3g}, at most {float(cells.max()):.3g} in a cell", "unit of J")]
+        mean, most = float(cells.mean()), float(cells.max())
+        rows = [Row("expected regret", f"{mean:.3g}, at most {most:.3g} in a cell", "unit of J")]
         if self.seeker.settings["guide"]:
-            rows.append(("share of the guide", f"{self.seeker.trust:.2f}", "-"))
-        return [*rows, *(("finding", str(finding), "") for finding in self.findings)]
+            rows.append(Row("share of the guide", f"{self.seeker.trust:.2f}", "-"))
+        return [*rows, *(Row("finding", str(finding), "-") for finding in self.findings)]
 
     def _repr_html_(self) -> str:
         return super()._repr_html_() + findings_html("Findings", self.findings)
@@ -168,7 +169,7 @@ def _maps(seeker: MapSeeking, cells: xr.Dataset, visits: Sequence[Visit]) -> dic
     }  # fmt: skip
     labels = {"regret": ("unit of J", "expected regret")}
     for k, name in enumerate(seeker.limit_names):
-        column = f"holds_{name.lstrip('-')}"
+        column = f"{name.lstrip('-')}_holds"
         known[column] = cells["holds"].to_numpy()[..., k]
         labels[column] = ("-", f"probability that the limit of {name.lstrip('-')} holds")
     task = MapTask(

@@ -44,6 +44,8 @@ class OwnSeeker:
         self.settings = {"inputs": list(inputs), "limits": list(limits), "maximize": maximize}
         self.input_names, self.limit_names = [one.name for one in inputs], [one.name for one in limits]
         self._takes = set(inspect.signature(own.tell).parameters)
+        if hasattr(own, "at"):
+            self.at = own.at  # says at which operating point the next cycle runs
         if self.estimate.size != len(inputs):
             raise ShapeError(f"seeker: its estimate has {self.estimate.size} entries: must have {len(inputs)}, inputs")
 
@@ -238,7 +240,7 @@ def require_point_for(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine)
 def _one_cycle(
     plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker | FeedForward | GuidedEngine, log: list[Row]
 ) -> None:
-    if isinstance(seeker, FeedForward | GuidedEngine) and hasattr(plant, "point"):
+    if hasattr(seeker, "at") and hasattr(plant, "point"):
         seeker.at(plant.point)
     elif announcing is not None and announcing.operating_point_changes:
         seeker.restart()

@@ -19,7 +19,7 @@ from mgdd.loop.plant import Plant
 from mgdd.loop.seek import plant_of, seek_inputs
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.loop.virtual_test_bed import VirtualTestBed
-from mgdd.optimize.map_seeking import MapSeeking
+from mgdd.optimize.map_seeking import MapSeeking, entries_of
 from mgdd.presets.meant import cylinder_of
 from mgdd.presets.preset import Preset
 
@@ -33,6 +33,7 @@ _FEWEST = 10  # cycles that tell what a mean is worth
 _KNOWN = 0.5  # of what is not known at a visit: a mean that is surer teaches little more
 _FAILED = 0.5  # share of the cycles of a visit
 _NODES = {1: 41, 2: 17, 3: 11}
+_SURE_FROM = 3  # visits per axis and input: what fewer promise of the regret is too much
 
 
 class Progress(NamedTuple):
@@ -155,10 +156,10 @@ def seek_map(
     if tolerance is not None and not tolerance > 0.0:
         raise ParameterError.of("tolerance", tolerance, "> 0, in the unit of J")
     sides = both_sides(limits) if seeker is None else tuple(seeker.settings["limits"])
-    if isinstance(plant, VirtualEngine):
-        plant = bed_of(plant, list(axes), measured_names(sides))
     sought = seek_inputs(inputs) if seeker is None else tuple(seeker.settings["inputs"])
-    entries = dict(axes) if seeker is None else seeker.axes
+    entries = entries_of(axes, [one.name for one in sought]) if seeker is None else seeker.axes
+    if isinstance(plant, VirtualEngine):
+        plant = bed_of(plant, list(entries), measured_names(sides))
     whole = [*_as_inputs(entries), *sought]
     driven = plant_of(plant, whole, sides)
     dwell = _dwell(plant, averaged, settling)
@@ -260,7 +261,7 @@ def _searched(
             made.append(row)
         if made and hasattr(plant, "visit"):
             plant.visit = len(made)
-    regret = math.inf
+    fewest = _SURE_FROM * (len(seeker.axes) + len(seeker.input_names))
     try:
         while seeker.readings < visits:
             suggestion = seeker.suggest()
@@ -274,7 +275,7 @@ def _searched(
                 regret = float(cells.max()) if np.isfinite(cells).all() else math.inf
                 if on_visit is not None:
                     on_visit(Progress(len(made), visit, float(cells.mean())))
-                if tolerance is not None and seeker.suggest().gain > 0.0 and regret <= tolerance:
+                if tolerance is not None and len(made) >= fewest and regret <= tolerance:
                     break
     except KeyboardInterrupt:
         interrupted = True

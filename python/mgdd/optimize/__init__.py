@@ -36,6 +36,7 @@ from mgdd._rooms import furnish as _furnish
 from mgdd.optimize.direct_seekers import ExtremumSeeking, GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import FitOptions, least_squares
+from mgdd.optimize.map_seeking import MapSeeking
 from mgdd.optimize.measured_map import measure_map
 from mgdd.optimize.process_seeking import GaussianProcessSeeking
 from mgdd.optimize.seeker import Seeker
@@ -43,7 +44,7 @@ from mgdd.optimize.tuning import tune
 
 __all__ = [
     "ComponentLag", "ExtremumSeeking", "FitOptions", "GaussianProcessSeeking", "GoldenSection", "GradientDescent",
-    "Input", "IterativeLearning", "Limit", "Seeker", "Spsa", "least_squares", "measure_map", "tune",
+    "Input", "IterativeLearning", "Limit", "MapSeeking", "Seeker", "Spsa", "least_squares", "measure_map", "tune",
 ]  # fmt: skip
 
 _furnish(__name__)

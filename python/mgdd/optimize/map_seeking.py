@@ -140,15 +140,14 @@ class MapSeeking(_core.optimize.MapSeeking):
         start: Mapping[str, float] | None = None,
         **settings: Any,
     ) -> None:
-        sought, entries = inputs_of(inputs), _entries(axes)
+        sought = inputs_of(inputs)
         names = [one.name for one in sought]
+        entries = entries_of(axes, names)
         if not names:
             raise ParameterError("inputs: none given; give bounds by name, for example {'soc_cad': (-20.0, 5.0)}")
         for one in sought:
             if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
                 raise ParameterError(f"inputs: {one.name} = ({one.lower:g}, {one.upper:g}): give finite bounds")
-        if twice := [name for name in names if name in entries]:
-            raise ParameterError(f"inputs: {', '.join(twice)} is an axis too: name it in one of them")
         kept = limits_of(limits)
         nodes = [np.linspace(one.lower, one.upper, _NODES.get(len(names), 5)) for one in sought]
         over = {**entries, **dict(zip(names, nodes, strict=True))}
@@ -269,6 +268,10 @@ class MapSeeking(_core.optimize.MapSeeking):
         if status > 1:
             raise DataError(f"J = {J!r}, limits = {values}: {_REFUSED[min(status - 3, 2)]}")
 
+    def driver(self) -> MapDriver:
+        """Give a seeker for an engine that is driven through operating points; all it reads this search learns."""
+        return MapDriver(self)
+
     def cells(self) -> xr.Dataset:
         """Give the map as it is known now.
 
@@ -294,7 +297,7 @@ class MapSeeking(_core.optimize.MapSeeking):
         excess = np.reshape([row[6] for row in rows], shape) if held else np.full(shape, -1.0)
         variables["excess"] = (tuple(axes), excess, "-", "excess over the worst limit, share of it")
         if held:
-            variables["limit"] = ("limit", list(held))
+            variables["limit"] = ("limit", list(held), "-", "limited quantity")
             variables["holds"] = (
                 (*axes, "limit"), np.reshape([row[7] for row in rows], (*shape, len(held))), "-",
                 "probability that the limit holds",
@@ -333,14 +336,96 @@ class MapSeeking(_core.optimize.MapSeeking):
         return np.array(numbers)
 
 
-def _entries(axes: Any) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
-    """Read the axes of a map, two entries at least."""
+class MapDriver:
+    """A search for a map as the seeker of an engine that others drive: ``seek(engine, inputs, seeker=search.driver())``.
+
+    At each operating point it asks for what is worth most there, and what is read teaches the whole map. Outside of the
+    axes the nearest point is asked for and nothing is learnt.
+
+    Parameters
+    ----------
+    search : MapSeeking
+        Changes as the engine runs.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import MapSeeking
+    >>> search = MapSeeking({"x": (-5.0, 5.0)}, {"load": [0.0, 1.0]})
+    >>> driver = search.driver()
+    >>> for k in range(40):
+    ...     load = k // 20 * 0.5
+    ...     driver.at({"load": load})
+    ...     driver.tell(-((driver.ask()[0] - 2.0 * load) ** 2))
+    >>> bool(abs(driver.estimate[0] - 1.0) < 0.1)
+    True
+    """
+
+    def __init__(self, search: MapSeeking) -> None:
+        self.search = search
+        self._bounds = {one.name: (one.lower, one.upper) for one in search.settings["context"]}
+        self._point: dict[str, float] | None = None
+        self._outside = False
+        self._asked: dict[str, float] | None = None
+
+    def at(self, point: Any) -> None:
+        """Say at which operating point the next cycle runs: numbers by name, or an object that has them."""
+        own = {}
+        for name in self._bounds:
+            value = point.get(name) if isinstance(point, Mapping) else getattr(point, name, None)
+            if value is None or not math.isfinite(value):
+                raise ParameterError(f"point: {name} = {value!r}: must be a number, as the axes of the map are")
+            own[name] = float(value)
+        held = {name: min(max(own[name], low), high) for name, (low, high) in self._bounds.items()}
+        self._outside, self._asked = held != own, None if held != self._point else self._asked
+        self._point = held
+
+    @property
+    def estimate(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """The best inputs at this point, as they are known now."""
+        if self._point is not None and self._asked is None:
+            self.ask()
+        return np.asarray(self.search._estimate)
+
+    def ask(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Give the inputs of the next cycle, in their order; ParameterError before `at`."""
+        if self._point is None:
+            raise ParameterError("ask() before at(point): the operating point is not known")
+        if self._asked is None:
+            self._asked = self.search.ask(self._point)
+        return np.array(list(self._asked.values()))
+
+    def tell(
+        self,
+        J: float,  # noqa: N803
+        limits: Any = None,
+        *,
+        misfire: bool = False,
+        applied: Any = None,
+    ) -> None:
+        """Accept what was read in this cycle; as any seeker of one's own it maximises, the search as it was made."""
+        names = self.search.input_names
+        if not self.search.settings["maximize"]:
+            J = -J  # noqa: N806
+        asked = self.ask() if applied is None else np.asarray(applied, np.float64)
+        inputs = dict(zip(names, asked.tolist(), strict=True))
+        if self._outside:
+            self._asked = None
+            return
+        assert self._point is not None  # noqa: S101 - ask() has refused it
+        self.search.tell(self._point, inputs, None if misfire else J, limits, misfire=misfire)
+        self._asked = None
+
+
+def entries_of(axes: Any, inputs: Sequence[str]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """Read the axes of a map, two entries at least, none of them called as an input."""
     if not isinstance(axes, Mapping) or not axes:
         raise ParameterError.of("axes", axes, "names with their entries, for example {'fuel_mg': [6, 20, 40]}")
     out = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in axes.items()}
     for name, column in out.items():
         if column.size < 2 or not np.isfinite(column).all() or not (np.diff(column) > 0.0).all():
             raise ParameterError.of(f"axes of {name}", column.tolist(), "two entries at least, finite, increasing")
+    if twice := [name for name in inputs if name in out]:
+        raise ParameterError(f"inputs: {', '.join(twice)} is an axis too: name it in one of them")
     return out
 
 

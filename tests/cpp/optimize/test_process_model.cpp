@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -96,6 +97,45 @@ TEST(ProcessModel, FullItForgetsOldReadingsNearTheEstimateAndKeepsFarOnes) {
   model.predict(ends, 2);
   EXPECT_NEAR(model.mean(0), -5.0, 0.5);
   EXPECT_NEAR(model.mean(1), -6.0, 0.5);
+}
+
+TEST(ProcessModel, ARowOfCovariancesIsThatOfEachPair) {
+  ProcessModel model = told(25, 0.2, {.most_points = 700});
+  InputTable points(700, 2);
+  for (int p = 0; p < 700; ++p)
+    points.row(p) << random::uniform(5, 1, static_cast<std::uint64_t>(p)),
+        random::uniform(5, 2, static_cast<std::uint64_t>(p));
+  model.predict(points, 700);
+  std::vector<double> row(700);
+  model.covariances(3, 700, row.data());
+  for (const int p : {0, 3, 499, 500, 699})
+    EXPECT_NEAR(row[static_cast<std::size_t>(p)], model.covariance(3, p), 1e-9 * model.covariance(3, 3)) << p;
+}
+
+// Four readings at one place are as good as their mean, said to be of four.
+TEST(ProcessModel, AMeanOfReadingsCountsAsAllOfThem) {
+  const ProcessModel::Settings apart{.inputs = 1, .memory = 1e9, .noise_sd = 0.5};
+  ProcessModel each(apart), mean(apart);
+  const Inputs about = scalar_input(0.5);
+  for (int k = 0; k < 12; ++k) {
+    const Inputs z = scalar_input(0.08 * k);
+    std::array<double, 4> read{};
+    for (std::size_t r = 0; r < read.size(); ++r)
+      read[r] = std::sin(3.0 * z[0]) + 0.5 * random::normal(6, static_cast<std::uint64_t>(k), r);
+    for (const double value : read)
+      each.record(z, value, about);
+    mean.record(z, (read[0] + read[1] + read[2] + read[3]) / 4.0, about, 4.0);
+  }
+  InputTable points(3, 1);
+  points << 0.11, 0.47, 0.83;
+  each.fit(about);
+  mean.fit(about);
+  each.predict(points, 3);
+  mean.predict(points, 3);
+  for (int p = 0; p < 3; ++p) {
+    EXPECT_NEAR(mean.mean(p), each.mean(p), 0.15) << p;
+    EXPECT_NEAR(mean.sd(p), each.sd(p), 0.3 * each.sd(p)) << p;
+  }
 }
 
 TEST(KnowledgeGradient, IsTheMeanRiseOfTheLargest) {

@@ -57,7 +57,7 @@ void MapSeeking::first_visit() noexcept {
   const auto middle = std::ranges::min_element(
       cells_of, {}, [](const Place& place) { return (place.context.array() - 0.5).matrix().squaredNorm(); });
   std::size_t at = static_cast<std::size_t>(middle - cells_of.begin());
-  Inputs z = first_input(unscaled_context(middle->context));
+  Inputs z = first_input(cell(at));
   const auto side = static_cast<Eigen::Index>(told_ % (1 + context_ + inputs_)) - 1;
   if (side >= 0 && side < inputs_) {
     z[side] += z[side] > 0.5 ? -first_step : first_step;
@@ -171,7 +171,7 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     visit_.gain = 0.0;
   }
   visit_.sd = j_.sd(next);
-  visit_.context = unscaled_context(candidates_.row(next).head(context_).transpose());
+  visit_.context = cell(static_cast<std::size_t>(next / per_place));
   visit_.input = unscaled(candidates_.row(next).tail(inputs_).transpose());
   return visit_;
 }
@@ -186,11 +186,10 @@ const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
     asked_ = unscaled(settable(z));
     return asked_;
   }
-  // From the best of the nearest cell at another point.
   if ((at - here.context).cwiseAbs().maxCoeff() > 0.0 && cells() > 0) {
-    here.best = std::ranges::min_element(all_cells(), {}, [&](const Place& place) {
+    here.from = std::ranges::min_element(all_cells(), {}, [&](const Place& place) {
                   return (place.context - at).squaredNorm();
-                })->best;
+                })->from;
   }
   here.context = at;
   const std::span<Place> places(&here, 1);

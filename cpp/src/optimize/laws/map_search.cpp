@@ -95,6 +95,8 @@ void MapSeeking::scatter(std::span<const Place> places) noexcept {
 }
 
 void MapSeeking::search(std::span<Place> places) noexcept {
+  for (Place& place : places)
+    place.best = place.from;
   scatter(places);
   int from = 0;
   for (Place& place : places) {

@@ -152,18 +152,8 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
       edges_(InputTable::Zero(static_cast<Eigen::Index>(settings_.limits.size()), inputs_)),
       joint_(per_place, per_place),
       worth_(per_place) {
-  for (std::size_t c = 0; c < places_.size(); ++c) {
-    Place& place = places_[c];
-    place.context = Inputs::Zero(context_);
-    std::size_t rest_of = c;
-    for (Eigen::Index i = context_ - 1; i >= 0 && c < cells(); --i) {
-      const auto& axis = settings_.axes[static_cast<std::size_t>(i)];
-      place.context[i] = axis[rest_of % axis.size()];
-      rest_of /= axis.size();
-    }
-    if (c < cells()) place.context = scaled_context(place.context);
-    place.best = lowest_;
-  }
+  for (std::size_t c = 0; c < places_.size(); ++c)
+    places_[c] = {c < cells() ? scaled_context(cell(c)) : Inputs(Inputs::Zero(context_)), lowest_, lowest_};
   const auto points = static_cast<std::size_t>(candidates_.rows());
   for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &effect_})
     one->assign(points, 0.0);
@@ -172,20 +162,21 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
   multipliers_.assign(places_.size() * limited_.size(), 0.0);
 }
 
+Inputs MapSeeking::cell(std::size_t c) const noexcept {
+  Inputs out(context_);
+  for (Eigen::Index i = context_ - 1; i >= 0; --i) {
+    const auto& axis = settings_.axes[static_cast<std::size_t>(i)];
+    out[i] = axis[c % axis.size()];
+    c /= axis.size();
+  }
+  return out;
+}
+
 Inputs MapSeeking::scaled_context(const Inputs& context) const noexcept {
   Inputs out(context_);
   for (Eigen::Index i = 0; i < context_; ++i) {
     const Input& own = settings_.context[static_cast<std::size_t>(i)];
     out[i] = (context[i] - own.lower) / (own.upper - own.lower);
-  }
-  return out;
-}
-
-Inputs MapSeeking::unscaled_context(const Inputs& scaled) const noexcept {
-  Inputs out(context_);
-  for (Eigen::Index i = 0; i < context_; ++i) {
-    const Input& own = settings_.context[static_cast<std::size_t>(i)];
-    out[i] = own.lower + scaled[i] * (own.upper - own.lower);
   }
   return out;
 }
@@ -225,6 +216,8 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
   last_context_ = context;
   ++told_;
   searched_ = false;
+  for (Place& place : places_)
+    place.from = place.best;
   failing_.record(z, !reading.misfire, z);
   failing_.fit(z);
   since_failure_ = reading.misfire ? 0 : since_failure_ + 1;
@@ -260,7 +253,7 @@ void MapSeeking::reseed(std::uint64_t seed) noexcept {
 void MapSeeking::require_usable() const {
   failing_.require_usable();
   for (const Place& place : places_) {
-    for (const double entry : place.best)
+    for (const double entry : place.from)
       require_in(closed(0.0, 1.0), "place", entry);
   }
 }

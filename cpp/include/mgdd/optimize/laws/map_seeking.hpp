@@ -92,12 +92,15 @@ class MapSeeking {
   const Visit& suggest() noexcept;
   /// The input that is worth most at a point that others have chosen, within the bounds of the context.
   const Inputs& ask(const Inputs& context) noexcept;
+  /// What was best at the point of the last `ask`, as it was known then.
+  Inputs estimate() const noexcept { return unscaled(places_.back().best); }
   /// What was read at an input and a point, or the mean of several readings.
   TellStatus tell(const Inputs& context, const Inputs& input, const Reading& reading, double readings = 1.0) noexcept;
   void reseed(std::uint64_t seed) noexcept;
 
   std::size_t cells() const noexcept { return places_.size() - 1; }
-  Inputs cell(std::size_t c) const noexcept { return unscaled_context(places_[c].context); }
+  /// The point of a cell, the last axis fastest.
+  Inputs cell(std::size_t c) const noexcept;
   Best best(std::size_t c) noexcept;
   /// Probability that limit i holds at the best input of a cell.
   double holds(std::size_t c, std::size_t i) noexcept;
@@ -120,7 +123,7 @@ class MapSeeking {
     v("highest", self.highest_);
     v("last_context", self.last_context_);
     for (std::size_t c = 0; c < self.places_.size(); ++c) {
-      v("place" + std::to_string(c), self.places_[c].best);
+      v("place" + std::to_string(c), self.places_[c].from);
     }
     v("asked_context", self.places_.back().context);
     Surprise::visit(self.surprise_, v, "surprise");
@@ -128,7 +131,11 @@ class MapSeeking {
     for (std::size_t i = 0; i < self.limited_.size(); ++i)
       LimitProcess::visit(self.limited_[i], v, "limit" + std::to_string(i));
     FailingProcess::visit(self.failing_, v);
-    if constexpr (!std::is_const_v<Self>) self.searched_ = false;
+    if constexpr (!std::is_const_v<Self>) {
+      self.searched_ = false;
+      for (Place& place : self.places_)
+        place.best = place.from;
+    }
   }
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const;
@@ -140,11 +147,11 @@ class MapSeeking {
 
   struct Place {
     Inputs context, best;  // scaled
+    Inputs from;           // that its search begins at, so that it is a function of the readings alone
     double excess = 0.0;   // of the worst limit there, with its probability
   };
   std::span<Place> all_cells() noexcept { return {places_.data(), cells()}; }
   Inputs scaled_context(const Inputs& context) const noexcept;
-  Inputs unscaled_context(const Inputs& scaled) const noexcept;
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs settable(const Inputs& z) const noexcept;

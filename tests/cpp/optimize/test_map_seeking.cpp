@@ -1,0 +1,227 @@
+// A search for a map on a spark engine of its own: torque over spark advance, held back by knock, and by exhaust heat.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/state.hpp"
+#include "mgdd/optimize/laws/map_seeking.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+using test_support::AllocationCounter;
+
+constexpr double knock_limit = 1.0;
+
+struct Plant {
+  double octane = 0.0;  // degrees of spark by which knock comes later
+  double mbt_shift = 0.0, scale = 1.0;
+
+  double mbt(const Inputs& at) const { return 14.0 + 6.0 * (at[0] - 1.0) - 9.0 * at[1] + mbt_shift; }
+  double torque(const Inputs& at, double spark) const {
+    const double off = spark - mbt(at);
+    return scale * at[1] * (200.0 - 0.11 * off * off - 0.0012 * off * off * off);
+  }
+  double knock(const Inputs& at, double spark) const {
+    return 0.25 * std::exp((spark - 20.0 - octane + 22.0 * (at[1] - 0.5) - 2.0 * (at[0] - 2.0)) / 7.0);
+  }
+  // Best spark under the knock limit.
+  double best(const Inputs& at) const {
+    double spark = -10.0;
+    for (double tried = -10.0; tried <= 45.0; tried += 0.01)
+      if (knock(at, tried) <= knock_limit && torque(at, tried) > torque(at, spark)) spark = tried;
+    return spark;
+  }
+};
+
+Inputs point(double krpm, double load) {
+  Inputs out(2);
+  out << krpm, load;
+  return out;
+}
+
+Surface surface_of(const Plant& plant, bool knock) {
+  const std::vector<double> speeds{1.0, 2.0, 3.0, 4.0}, loads{0.3, 0.6, 0.9};
+  std::vector<double> sparks, values;
+  for (double spark = -10.0; spark <= 45.0; spark += 2.5)
+    sparks.push_back(spark);
+  for (const double speed : speeds)
+    for (const double load : loads)
+      for (const double spark : sparks)
+        values.push_back(knock ? plant.knock(point(speed, load), spark) : plant.torque(point(speed, load), spark));
+  return Surface({speeds, loads, sparks}, values);
+}
+
+MapSeekingSettings settings(std::uint64_t seed, const Plant* guide) {
+  MapSeekingSettings s;
+  s.space = {scalar_input(2.0), scalar_input(-10.0), scalar_input(45.0)};
+  s.context = {{"speed_krpm", 1.0, 4.0}, {"load", 0.3, 0.9}};
+  s.axes = {{1.0, 2.0, 3.0, 4.0}, {0.3, 0.6, 0.9}};
+  s.limits = {{"knock", knock_limit}};
+  s.seed = seed;
+  if (guide != nullptr) {
+    s.guide = {surface_of(*guide, false)};
+    s.limit_guides = {surface_of(*guide, true)};
+  }
+  return s;
+}
+
+void read(MapSeeking& search, const Plant& plant, const Inputs& at, const Inputs& input, std::uint64_t draw) {
+  const double noise = 0.2 * random::normal(9, 1, draw), knock_noise = 0.01 * random::normal(9, 2, draw);
+  const double torque = plant.torque(at, input[0]) + noise;
+  const std::array<double, 1> knock{plant.knock(at, input[0]) + knock_noise};
+  ASSERT_EQ(search.tell(at, input, {.components = {&torque, 1}, .limits = knock}), TellStatus::accepted);
+}
+
+struct Judged {
+  double worst_loss = 0.0, worst_knock = 0.0;
+};
+
+Judged visited(MapSeeking& search, const Plant& plant, int visits, std::uint64_t seed) {
+  Judged out;
+  for (int k = 0; k < visits; ++k) {
+    const MapSeeking::Visit visit = search.suggest();
+    out.worst_knock = std::max(out.worst_knock, plant.knock(visit.context, visit.input[0]));
+    read(search, plant, visit.context, visit.input, 1000 * seed + static_cast<std::uint64_t>(k));
+  }
+  for (std::size_t c = 0; c < search.cells(); ++c) {
+    const Inputs at = search.cell(c);
+    const double own = search.best(c).input[0];
+    out.worst_loss = std::max(out.worst_loss, plant.torque(at, plant.best(at)) - plant.torque(at, own));
+  }
+  return out;
+}
+
+TEST(MapSeeking, TenVisitsAndARoughModelMakeTheMapOfAnotherEngine) {
+  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    MapSeeking search(settings(seed, &rough));
+    const Judged found = visited(search, plant, 10, seed);
+    EXPECT_LT(found.worst_loss, 0.6) << seed;  // N m of some 60 to 180
+    EXPECT_LT(found.worst_knock, 1.05 * knock_limit) << seed;
+  }
+}
+
+TEST(MapSeeking, WithoutAModelItTakesMoreVisits) {
+  const Plant plant;
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    MapSeeking search(settings(seed, nullptr));
+    EXPECT_LT(visited(search, plant, 40, seed).worst_loss, 3.0) << seed;
+  }
+}
+
+TEST(MapSeeking, AModelOfTheWrongWayIsLeftBehind) {
+  const Plant plant, wrong{.octane = 0.0, .mbt_shift = 0.0, .scale = -1.0};
+  MapSeeking search(settings(1, &wrong));
+  EXPECT_LT(visited(search, plant, 40, 1).worst_loss, 3.0);
+}
+
+TEST(MapSeeking, AskFindsTheBestOfAPointBetweenTheCells) {
+  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
+  MapSeeking search(settings(2, &rough));
+  visited(search, plant, 8, 2);
+  const Inputs at = point(2.4, 0.45);
+  double lost = 0.0;
+  for (std::uint64_t k = 0; k < 12; ++k) {
+    const Inputs asked = search.ask(at);
+    lost += (plant.torque(at, plant.best(at)) - plant.torque(at, asked[0])) / 12.0;
+    read(search, plant, at, asked, 70'000 + k);
+  }
+  EXPECT_LT(lost, 0.6);
+}
+
+TEST(MapSeeking, AskAndTellAllocateNothing) {
+  const Plant plant;
+  MapSeeking search(settings(3, &plant));
+  visited(search, plant, 4, 3);
+  const Inputs at = point(1.7, 0.8);
+  const AllocationCounter counter;
+  for (std::uint64_t k = 0; k < 6; ++k) {
+    const Inputs asked = search.ask(at);
+    const double torque = plant.torque(at, asked[0]);
+    const std::array<double, 1> knock{plant.knock(at, asked[0])};
+    search.tell(at, asked, {.components = {&torque, 1}, .limits = knock});
+  }
+  EXPECT_EQ(counter.count(), 0u);
+  static_assert(noexcept(search.ask(at)) && noexcept(search.suggest()));
+}
+
+TEST(MapSeeking, GoesOnBitForBitFromItsState) {
+  const Plant plant, rough{.octane = 2.0, .mbt_shift = -3.0, .scale = 1.1};
+  MapSeeking search(settings(4, &rough)), copy(settings(4, &rough));
+  visited(search, plant, 7, 4);
+  restore_state(copy, save_state(search));
+  for (int k = 0; k < 3; ++k) {
+    const MapSeeking::Visit one = search.suggest(), other = copy.suggest();
+    EXPECT_EQ(one.context, other.context);
+    EXPECT_EQ(one.input, other.input);
+    EXPECT_EQ(one.gain, other.gain);
+    read(search, plant, one.context, one.input, static_cast<std::uint64_t>(k));
+    read(copy, plant, other.context, other.input, static_cast<std::uint64_t>(k));
+  }
+  StateColumns broken = save_state(search);
+  broken["place3"][0] = 1.5;
+  EXPECT_THROW(restore_state(copy, broken), ParameterError);
+}
+
+TEST(MapSeeking, KeepsOutOfACellThatFails) {
+  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
+  MapSeeking search(settings(5, &rough));
+  int failed = 0;
+  for (std::uint64_t k = 0; k < 24; ++k) {
+    const MapSeeking::Visit visit = search.suggest();
+    const bool fails = visit.context[0] > 3.5 && visit.context[1] < 0.4;
+    failed += fails ? 1 : 0;
+    if (fails)
+      EXPECT_EQ(search.tell(visit.context, visit.input, {.misfire = true}), TellStatus::misfire);
+    else
+      read(search, plant, visit.context, visit.input, k);
+  }
+  EXPECT_LE(failed, 4);
+}
+
+TEST(MapSeeking, RefusesWhatIsNoReadingAndChangesNothing) {
+  const Plant plant;
+  MapSeeking search(settings(6, &plant));
+  visited(search, plant, 3, 6);
+  const StateColumns before = save_state(search);
+  const double nan = std::nan(""), torque = 100.0;
+  const std::array<double, 1> knock{0.5}, bad{nan};
+  EXPECT_EQ(search.tell(point(2, 0.5), scalar_input(9), {.components = {&nan, 1}, .limits = knock}),
+            TellStatus::not_a_reading);
+  EXPECT_EQ(search.tell(point(2, 0.5), scalar_input(9), {.components = {&torque, 1}, .limits = bad}),
+            TellStatus::not_a_reading);
+  EXPECT_EQ(search.tell(point(2, 0.5), scalar_input(9), {.components = {&torque, 1}}), TellStatus::wrong_limit_count);
+  EXPECT_EQ(save_state(search), before);
+}
+
+TEST(MapSeeking, RefusesSettingsByName) {
+  const Plant plant;
+  const auto refused = [&](const auto& change) {
+    MapSeekingSettings s = settings(0, &plant);
+    change(s);
+    try {
+      MapSeeking search(std::move(s));
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refused([](auto& s) { s.axes[1] = {0.3, 0.3}; }).find("axes of load"), std::string::npos);
+  EXPECT_NE(refused([](auto& s) { s.axes[0].back() = 5.0; }).find("axes of speed_krpm"), std::string::npos);
+  EXPECT_NE(refused([](auto& s) { s.axes.pop_back(); }).find("axes"), std::string::npos);
+  EXPECT_NE(refused([](auto& s) { s.context[0].upper = unlimited; }).find("speed_krpm"), std::string::npos);
+  EXPECT_NE(refused([](auto& s) { s.space.lower = scalar_input(-unlimited); }).find("lower"), std::string::npos);
+  EXPECT_NE(refused([](auto& s) {
+              s.limit_guides.clear();
+              s.guide.push_back(s.guide[0]);
+            }).find("guide"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace mgdd::optimize
