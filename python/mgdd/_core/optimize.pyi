@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'Parameter', 'Spsa', 'Surface', 'autocorrelation_time', 'latin_hypercube', 'least_squares']
+__all__: list[str] = ['ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'MapSeeking', 'Parameter', 'Spsa', 'Surface', 'autocorrelation_time', 'latin_hypercube', 'least_squares']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -1404,6 +1404,97 @@ class GaussianProcessSeeking:
     def trust(self) -> float:
         """
         Least share of the bends of J that a guide holds, as learnt: above 0.5 where it helps, towards 0 where it says nothing; 1 without a guide.
+        """
+class MapSeeking:
+    """
+    A map by Gaussian processes; see mgdd.optimize.MapSeeking.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, context: collections.abc.Sequence[Input] | None = None, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, averaged: typing.SupportsFloat | typing.SupportsIndex = 1.0, moving_cost: typing.SupportsFloat | typing.SupportsIndex = 0.0, memory_readings: typing.SupportsFloat | typing.SupportsIndex = 1000.0, kept: typing.SupportsInt | typing.SupportsIndex = 200, reach: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        inputs : names, units, bounds and scales
+        context : numbers of an operating point
+        axes : entries of each, whose product are the cells
+        noise_sd : of one reading of J
+        horizon : readings at a point for which what is learnt pays
+        averaged : readings whose mean a visit gives
+        moving_cost : of another operating point, in visits
+        memory_readings : in which level and place are expected to wander
+        kept : readings at most
+        reach : from the best input of a cell, share of the bounds
+        limit_probability : with which a limit holds in a cell
+        seed : of the inputs that are compared
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        guide : what a model says of J
+        limit_guides : the same of every limit
+        """
+    def __repr__(self) -> str:
+        ...
+    def _ask(self, context: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Input of the next reading at a point.
+        """
+    def _cells(self) -> list:
+        """
+        Of every cell: point, best input and its sd, objective there, its sd, expected regret, excess, probability of limits.
+        """
+    def _suggest(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], float, float]:
+        """
+        Point and input of the next reading, by what it is expected to raise the objective, and what is not known of it there, as a standard deviation. Releases the GIL.
+        """
+    def _tell(self, context: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], j: typing.SupportsFloat | typing.SupportsIndex, limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], misfire: bool, readings: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        """
+        What was read: 0 where it was taken, 1 for a misfire, else it was refused. Releases the GIL.
+        """
+    def reseed(self, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Compare other inputs from here on.
+        """
+    @property
+    def _estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Best input at the point of the last _ask, as it was known then.
+        """
+    @property
+    def doubts(self) -> int:
+        """
+        How often readings were not what was expected, and what was known was aged.
+        """
+    @property
+    def guide_factor(self) -> float:
+        """
+        What the guide is multiplied by, as learnt; 0 without one.
+        """
+    @property
+    def noise_sd(self) -> float:
+        """
+        Standard deviation of one reading of the objective, as learnt.
+        """
+    @property
+    def readings(self) -> int:
+        """
+        How many there were, failures included.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this search again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a search needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def trust(self) -> float:
+        """
+        Share of the objective's bends that the guide holds, as learnt; 1 without a guide.
         """
 class IterativeLearning:
     """

@@ -80,9 +80,7 @@ class MapSearch(Result):
     seeker: MapSeeking
 
     @classmethod
-    def of(
-        cls, seeker: MapSeeking, visits: Sequence[Visit], *, tolerance: float | None, interrupted: bool
-    ) -> Self:
+    def of(cls, seeker: MapSeeking, visits: Sequence[Visit], *, tolerance: float | None, interrupted: bool) -> Self:
         """Read the map of a seeker."""
         cells = seeker.cells()
         findings = tuple(_doubts(seeker, cells, visits, tolerance, interrupted=interrupted))

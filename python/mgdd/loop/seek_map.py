@@ -12,8 +12,8 @@ import numpy as np
 
 from mgdd.engine import Cylinder
 from mgdd.errors import DataError, Interrupted, ParameterError, argument
-from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
 from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
 from mgdd.loop.map_result import MapSearch, Visit
 from mgdd.loop.plant import Plant
 from mgdd.loop.seek import plant_of, seek_inputs
@@ -112,8 +112,8 @@ def seek_map(
     seeker : MapSeeking, optional
         Go on with that of an earlier result, which changes; it has inputs, axes, limits and guide of its own.
     record : path-like, optional
-        A CSV file with a row per visit. Where it holds some, the search goes on behind them, as if it had never stopped;
-        a record of another search is refused.
+        A CSV file with a row per visit. Where it holds some, the search goes on behind them as if it had never stopped; a
+        record of another search is refused.
     on_visit : callable, optional
         Called after every visit with its `Progress`.
     settings : mapping of str to any, optional
@@ -313,7 +313,7 @@ def _visited(
             for name in inputs:
                 applied[name].append(float(measured.applied.get(name, inputs[name])))
         counted = len(rows) + failed
-        if _FEWEST <= len(rows) and dwell.least <= counted < dwell.most:
+        if len(rows) >= _FEWEST and dwell.least <= counted < dwell.most:
             mean_sd = float(np.std([row[0] for row in rows], ddof=1)) / math.sqrt(len(rows))
             if 0.0 < mean_sd < _KNOWN * sd:
                 break
@@ -321,9 +321,7 @@ def _visited(
         return Visit(at, inputs, math.nan, dict.fromkeys(names, math.nan), float(len(rows) + failed), failed=True)
     means = np.mean(rows, axis=0).tolist()
     really = {name: float(np.mean(column)) for name, column in applied.items()}
-    return Visit(
-        at, really, means[0], dict(zip(names, means[1:], strict=True)), float(len(rows)), failed=False
-    )
+    return Visit(at, really, means[0], dict(zip(names, means[1:], strict=True)), float(len(rows)), failed=False)
 
 
 def _tell(seeker: MapSeeking, visit: Visit) -> None:

@@ -159,9 +159,7 @@ class MapSeeking(_core.optimize.MapSeeking):
         if limit_guides:
             given["limit_guides"] = _limit_guides(limit_guides, [one.name for one in kept], over)
         middle = {one.name: 0.5 * (one.lower + one.upper) for one in sought} if start is None else start
-        context = [
-            _core.optimize.Input(name, float(column[0]), float(column[-1])) for name, column in entries.items()
-        ]
+        context = [_core.optimize.Input(name, float(column[0]), float(column[-1])) for name, column in entries.items()]
         super().__init__(
             start=named_values("start", middle, names), inputs=list(sought), context=context,
             axes=[column.tolist() for column in entries.values()], limits=list(kept), **given, **settings,
@@ -285,7 +283,9 @@ class MapSeeking(_core.optimize.MapSeeking):
         own, axes, held = self.settings, self.axes, self.limit_names
         shape = tuple(column.size for column in axes.values())
         rows = self._cells()
-        variables: dict[str, tuple[Any, ...]] = {name: (name, column, *named_label(name)) for name, column in axes.items()}
+        variables: dict[str, tuple[Any, ...]] = {
+            name: (name, column, *named_label(name)) for name, column in axes.items()
+        }
         for k, one in enumerate(own["inputs"]):
             unit, text = unit_of_input(one), named_label(one.name).long_name
             variables[one.name] = (tuple(axes), np.reshape([row[1][k] for row in rows], shape), unit, text)
@@ -316,7 +316,8 @@ class MapSeeking(_core.optimize.MapSeeking):
         kind, settings, state = read_saved(path)
         if kind != "MapSeeking":
             raise DataError(f"{os.fspath(path)}: holds a {kind}, not a MapSeeking")
-        return _remade(cls, settings, state)
+        made: Self = _remade(cls, settings, state)
+        return made
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _remade, (type(self), self.settings, self.state)
@@ -337,7 +338,7 @@ class MapSeeking(_core.optimize.MapSeeking):
 
 
 class MapDriver:
-    """A search for a map as the seeker of an engine that others drive: ``seek(engine, inputs, seeker=search.driver())``.
+    """A search for a map as the seeker of a driven engine: ``seek(engine, inputs, seeker=search.driver())``.
 
     At each operating point it asks for what is worth most there, and what is read teaches the whole map. Outside of the
     axes the nearest point is asked for and nothing is learnt.
@@ -453,7 +454,7 @@ def _numbers(argument: str, given: Any, names: Sequence[str]) -> list[float]:
 
 
 def _remade(cls: type[Any], settings: dict[str, Any], state: dict[str, Any]) -> Any:
-    made = cls.__new__(cls)
+    made: Any = cls.__new__(cls)  # type: ignore[call-overload]
     _core.optimize.MapSeeking.__init__(made, **settings)
     made.state = state
     return made

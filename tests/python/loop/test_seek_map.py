@@ -165,7 +165,9 @@ def test_the_virtual_engine_is_driven_over_its_map() -> None:
     axes = {"speed_rpm": [1200.0, 1800.0, 2400.0], "fuel_mg": [10.0, 20.0, 30.0]}
     engine = VirtualEngine("puma_single", seed=2)
     limits = {"p_max_bar": 120.0}
-    found = seek_map(engine, {"soc_cad": (-20.0, 8.0)}, axes, limits=limits, guide=Cylinder(wall_heat_scale=1.0), visits=8)
+    found = seek_map(
+        engine, {"soc_cad": (-20.0, 8.0)}, axes, limits=limits, guide=Cylinder(wall_heat_scale=1.0), visits=8
+    )
     for at in itertools.product(*axes.values()):
         point = dict(zip(axes, at, strict=True))
         there = VirtualEngine("puma_single", point)
