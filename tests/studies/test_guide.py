@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
 from mgdd.engine import OperatingPoint
 from mgdd.loop import VirtualEngine
-from mgdd.results.labels import check_labels
 from mgdd_studies.base import StudyResult
 from mgdd_studies.guide_accuracy import HARD, HardCase, run_hard
 from mgdd_studies.guide_cases import (
@@ -171,15 +168,3 @@ def test_trouble_few_seeds(accuracy: StudyResult) -> None:
     for name in ("J late, delay known", "J late, delay given 4 short", "J late, delay given 4 long"):
         assert rows[name]["median_first"] <= 45.0
     assert all((row["median_back"] is not None) == name.startswith("jump") for name, row in rows.items())
-
-
-@pytest.mark.slow
-def test_datasets_figures_and_bars(start_up: StudyResult, accuracy: StudyResult) -> None:
-    for result in (start_up, accuracy):
-        check_labels(result.dataset)
-        assert len(result.figures) == 2
-        json.dumps(result.summary, allow_nan=False)
-        bars: list[dict[str, Any]] = result.summary["bars"]
-        assert all(bar["met"] == (bar["cases"] == bar["cases_met"]) for bar in bars)
-    assert len(start_up.summary["bars"]) == 5
-    assert len(accuracy.summary["bars"]) == 14

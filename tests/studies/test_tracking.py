@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -74,13 +74,8 @@ def test_the_study_runs_and_draws(quick: StudyResult) -> None:
     assert len(figure.axes) == 4
 
 
-def test_the_page_has_a_table_of_every_case(root: Path, quick: StudyResult) -> None:
+def test_the_page_has_a_table_of_every_case(root: Path, study_tables: ModuleType, quick: StudyResult) -> None:
     """Cases, presets and controllers alone: the numbers there are of 100 throttles, by `tools/study_tables.py`."""
-    spec = importlib.util.spec_from_file_location("study_tables", root / "tools" / "study_tables.py")
-    assert spec is not None
-    assert spec.loader is not None
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
     text = (root / "docs" / "throttle_tracking.md").read_text(encoding="utf-8")
     page = text.splitlines()
     some = quick.summary["rows"][0]
@@ -90,12 +85,12 @@ def test_the_page_has_a_table_of_every_case(root: Path, quick: StudyResult) -> N
         for preset in case.presets
         for controller in case.controllers
     ]
-    tables = tool.tables("throttle-tracking", quick.summary | {"rows": rows})
+    tables = study_tables.tables("throttle-tracking", quick.summary | {"rows": rows})
     assert list(tables) == [*(case.text for case in CASES.values()), "warm"]
     for lines in tables.values():
         at = page.index(lines[0])
         for made, printed in zip(lines[2:], page[at + 2 :], strict=False):
             assert made.split(" | ")[:2] == printed.split(" | ")[:2]
-    made = tool.put_into(text, "throttle-tracking", quick.summary)
+    made = study_tables.put_into(text, "throttle-tracking", quick.summary)
     assert made != text
-    assert tool.put_into(made, "throttle-tracking", quick.summary) == made
+    assert study_tables.put_into(made, "throttle-tracking", quick.summary) == made
