@@ -6,7 +6,6 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/ignition.hpp"
-#include "support/preset_file.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -19,21 +18,6 @@ std::string refusal(Call call) {
     return error.what();
   }
   return "";
-}
-
-// A change of the preset is a breaking change.
-TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
-  const Cylinder c;
-  test_support::expect_preset(c, cylinder_fields<double>(),
-                              {{"burn_shape", name_of(c.burn.burn_shape)},
-                               {"gamma_model", name_of(c.gas.gamma_model)},
-                               {"wall_heat_model", name_of(c.wall_heat.wall_heat_model)},
-                               {"ignition_model", name_of(c.ignition.ignition_model)}},
-                              "puma_single", "cylinder");
-  test_support::expect_preset(OperatingPoint{}, operating_point_fields<double>(), {}, "puma_single", "point");
-  EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
-  EXPECT_FALSE(OperatingPoint{}.trapped_mass_g.has_value());
-  EXPECT_FALSE(OperatingPoint{}.ivc_temperature_k.has_value());
 }
 
 // --- what is allowed ------------------------------------------------------------------------------------------

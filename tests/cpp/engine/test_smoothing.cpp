@@ -4,12 +4,10 @@
 #include <cmath>
 #include <numbers>
 #include <random>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "mgdd/engine/pressure/rise_rate.hpp"
 
 namespace mgdd::engine {
@@ -96,27 +94,6 @@ TEST(EngineSmoothing, TheDefaultActsOnFineTracesOnly) {
   EXPECT_EQ(Smoother(grid(-90.0, 90.0, 0.2), 1500.0, {}).name(), "savitzky_golay over 4 °CA (21 samples)");
   EXPECT_EQ(Smoother(grid(-90.0, 90.0, 0.5), 1500.0, {}).name(), "savitzky_golay over 4 °CA (9 samples)");
   EXPECT_EQ(Smoother(grid(-90.0, 90.0, 1.0), 1500.0, {}).name(), "none");
-}
-
-TEST(EngineSmoothing, RefusalsNameTheRemedy) {
-  const auto message = [](const Column& x, const TraceOptions& o) -> std::string {
-    try {
-      const Smoother smoother(x, 1500.0, o);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_NE(message(grid(-90.0, 90.0, 1.0), choose(Smoothing::savitzky_golay, 2.0)).find("take 4 or more"),
-            std::string::npos);
-  // Steps of 1 CAD at 1500 rpm: Nyquist is 4500 Hz, the highest cutoff 99 % of it.
-  EXPECT_NE(message(grid(-90.0, 90.0, 1.0), choose(Smoothing::low_pass, 4.0, 4500.0)).find("4455] Hz"),
-            std::string::npos);
-  // Steps of 0.1 CAD: 1 % of 45 kHz is the lowest.
-  EXPECT_NE(message(grid(-90.0, 90.0, 0.1), choose(Smoothing::low_pass, 4.0, 440.0)).find("[450, "), std::string::npos);
-  Column uneven = grid(-90.0, 90.0, 1.0);
-  uneven[30] += 0.2;
-  EXPECT_NE(message(uneven, choose(Smoothing::low_pass)).find("even angles"), std::string::npos);
 }
 
 double rise_of(const Column& x, const Column& p) {

@@ -1,8 +1,6 @@
 // Numbers and bounds of the pseudo-Wiener models: nothing is exchanged and nothing is lost.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -16,48 +14,6 @@ namespace {
 using test::asymmetric_pw_p;
 using test::asymmetric_pw_r;
 using test::asymmetric_pw_w;
-
-template <class P>
-void expect_bounds(const P& good, PseudoWienerKind kind) {
-  EXPECT_NO_THROW(good.validate());
-  const auto rows = fields(kind);
-  ASSERT_EQ(rows.size(), numbers(good).size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Domain& domain = rows[i].domain;
-    EXPECT_LT(domain.lower, domain.upper) << rows[i].name;
-    EXPECT_TRUE(!domain.log_scaled || domain.lower > 0.0) << rows[i].name;
-    for (const double outside : {domain.lower - 1e-3 * (1.0 + std::abs(domain.lower)), domain.upper * 1.01,
-                                 std::numeric_limits<double>::quiet_NaN()}) {
-      P bad = good;
-      *numbers(bad)[i] = outside;
-      try {
-        bad.validate();
-        ADD_FAILURE() << rows[i].name << " = " << outside;
-      } catch (const ParameterError& error) {
-        EXPECT_EQ(std::string(error.what()).rfind(std::string(rows[i].name) + " = ", 0), 0U) << error.what();
-      }
-    }
-  }
-}
-
-TEST(PseudoWienerNumbers, StandInTheOrderOfTheirFieldsAndAreBounded) {
-  PwR r = asymmetric_pw_r();
-  EXPECT_EQ(fields(PseudoWienerKind::pw_r)[9].name, "below_preload_duty");
-  EXPECT_EQ(*numbers(r)[9], 0.097);
-  EXPECT_EQ(fields(PseudoWienerKind::pw_r)[3].name, "above_spring_duty_per_deg");
-  EXPECT_EQ(*numbers(r)[3], 6.1e-4);
-  PwP p = asymmetric_pw_p();
-  EXPECT_EQ(fields(PseudoWienerKind::pw_p)[5].name, "radius_2_duty");
-  EXPECT_EQ(*numbers(p)[5], 0.05);
-  EXPECT_EQ(fields(PseudoWienerKind::pw_p)[8].name, "gain_3_deg_per_duty");
-  EXPECT_EQ(*numbers(p)[8], 35.0);
-  PwW w = asymmetric_pw_w();
-  EXPECT_EQ(fields(PseudoWienerKind::pw_w)[5].name, "rise_3_deg");
-  EXPECT_EQ(*numbers(w)[5], 9.0);
-  expect_bounds(r, PseudoWienerKind::pw_r);
-  expect_bounds(w, PseudoWienerKind::pw_w);
-  expect_bounds(p, PseudoWienerKind::pw_p);
-}
 
 TEST(PseudoWienerNumbers, SettingsOutsideTheirBoundsAreNamed) {
   const auto refused = [](auto good, auto change, const std::string& part) {

@@ -283,17 +283,6 @@ def test_a_saved_supervisor_goes_on_bit_for_bit(way):
     assert first.reason == "sensor_disagreement"
 
 
-def test_every_setting_has_unit_bounds_and_meaning_and_refuses_by_name():
-    described = ThrottleSupervisor.fields()
-    assert set(described) == set(ThrottleSupervisor().settings)
-    for name, field in described.items():
-        assert field["meaning"]
-        with pytest.raises(ParameterError) as error:
-            ThrottleSupervisor(**{name: math.nan})
-        assert error.value.field == name
-    assert repr(ThrottleSupervisor(jam_s=0.03)) == "ThrottleSupervisor(jam_s=0.03)"
-
-
 def test_faults_are_refused_by_name():
     with pytest.raises(ParameterError, match=r"kind = 'stiff': must be one of open_wire, .*, jammed, jammed_at"):
         ThrottleFault(kind="stiff")

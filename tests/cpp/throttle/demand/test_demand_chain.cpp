@@ -3,13 +3,10 @@
 #include "mgdd/throttle/demand/demand_chain.hpp"
 
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <string>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "support/demand_case.hpp"
 
 namespace mgdd::throttle {
@@ -113,34 +110,6 @@ TEST(Demand, NothingThatAMeasuredPressureCanBeGivesAJump) {
     const double opening = model.opening_deg(air, pressure, wanted);
     EXPECT_LT(std::fabs(opening - last), 0.05) << pressure;
     last = opening;
-  }
-}
-
-TEST(DemandChain, ARefusedParameterNamesItself) {
-  const auto refused = [](const std::string& field, const std::function<void(DemandChain&)>& change) {
-    DemandChain chain = odd_chain();
-    change(chain);
-    try {
-      (void)DemandTracker(chain, sample);
-      ADD_FAILURE() << field << " was taken";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.field, field);
-    }
-  };
-  refused("discharge_45", [](DemandChain& c) { c.bore.discharge_45 = 0.7; });
-  refused("pedal_percent", [](DemandChain& c) { c.pedal_map.pedal_percent = {0.0}; });
-  refused("pedal_percent[7]", [](DemandChain& c) { c.pedal_map.pedal_percent[7] = 101.0; });
-  refused("speed_rpm[0]", [](DemandChain& c) { c.pedal_map.speed_rpm[0] = 0.0; });
-  refused("wanted_nm", [](DemandChain& c) { c.pedal_map.wanted_nm.pop_back(); });
-  refused("wanted_nm[3][2]", [](DemandChain& c) { c.pedal_map.wanted_nm[3 * 8 + 2] = nan; });
-  refused("wanted_nm[3][2]", [](DemandChain& c) { c.pedal_map.wanted_nm[3 * 8 + 2] = -20.0; });
-  for (const double bad : {0.0, 1.5, nan}) {
-    try {
-      (void)DemandTracker(odd_chain(), bad);
-      ADD_FAILURE();
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, "sample_s");
-    }
   }
 }
 
