@@ -318,8 +318,15 @@ def test_a_stated_intake_pressure_is_held_against_the_trace():
     assert analyze(trace, CYLINDER, point=POINT, inlet_pressure_kpa=110.0).attrs["warnings"] == ""
     # A point is often that of another load: only what no load explains is doubted.
     assert analyze(trace, CYLINDER, point=POINT.replace(intake_pressure_kpa=260.0)).attrs["warnings"] == ""
-    megapascal = trace.assign(pressure_bar=trace.pressure_bar * 0.1)
-    assert "looks like MPa" in analyze(megapascal, CYLINDER, point=POINT).attrs["warnings"]
+    low, thin = CYLINDER.replace(compression_ratio=9.0), OperatingPoint(fuel_mg=1.0, intake_pressure_kpa=100.0)
+    for factor, cylinder, point, said in (
+        (0.1, CYLINDER, POINT, "looks like MPa"),
+        (4.0, CYLINDER, POINT, "fits no common unit"),
+        (14.504, low, thin, "looks like psi"),
+    ):
+        other = moved(simulate(cylinder, point)).assign_attrs(intake_pressure_kpa=point.intake_pressure_kpa)
+        other = other.assign(pressure_bar=other.pressure_bar * factor)
+        assert said in analyze(other, cylinder, point=point).attrs["warnings"]
 
 
 def test_conditions_come_from_the_trace_before_the_point():
