@@ -1,11 +1,36 @@
 // Extremum seeking by its laws, and the dither behind a sensor that is late.
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 
-#include "support/lagged_sensor.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
 namespace {
+
+/// Shows its input after a whole number of cycles and through a first-order lag.
+class LaggedSensor {
+ public:
+  /// `delay` cycles, time constant `lag` cycles (0: none), settled on `at`.
+  LaggedSensor(int delay, double lag, double at)
+      : line_(static_cast<std::size_t>(delay), at), share_(lag > 0.0 ? 1.0 - std::exp(-1.0 / lag) : 1.0), shown_(at) {}
+
+  double show(double value) {
+    if (!line_.empty()) {
+      std::swap(value, line_[next_]);
+      next_ = (next_ + 1) % line_.size();
+    }
+    return shown_ += share_ * (value - shown_);
+  }
+
+ private:
+  std::vector<double> line_;
+  double share_, shown_;
+  std::size_t next_ = 0;
+};
 
 // --- laws ---------------------------------------------------------------------------------------------------
 
@@ -162,7 +187,6 @@ TEST(ExtremumSeeking, ARestartHoldsTheEstimateAsTheStartDoes) {
   }
 }
 
-using test_support::LaggedSensor;
 
 DitherSettings window(int period, std::vector<int> harmonics) {
   return {.amplitude = Inputs::Constant(static_cast<Eigen::Index>(harmonics.size()), 1.0),

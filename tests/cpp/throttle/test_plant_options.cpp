@@ -142,22 +142,6 @@ TEST(ThrottleOptions, LanesStartFromTheWholeState) {
       ASSERT_NEAR(many[i * duty.size() + k], angle[k], 1e-11) << i << ' ' << k;
   }
   EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
-  EXPECT_THROW(simulate_many(cases, {.duty = duty}, 3, 6e-3), ParameterError);
-  const std::vector<double> percent(duty.size(), 35.0), short_supply(2, 12.0);
-  EXPECT_THROW(simulate_many(cases, {.duty = percent}, 3, 2e-4), DataError);
-  EXPECT_THROW(simulate_many(cases, {.duty = duty, .supply_v = short_supply}, 3, 2e-4), ShapeError);
-  for (const bool friction : {true, false}) {
-    auto mixed = cases;
-    if (friction) {
-      mixed[5].throttle.friction = Friction::tanh;
-    } else {
-      mixed[5].throttle.backlash = Backlash::none;
-    }
-    EXPECT_THROW(simulate_many(mixed, {.duty = duty}, 3, 2e-4), ParameterError);
-  }
-  auto bad = cases;
-  bad[8].throttle.inertia_kgm2 = -1.0;
-  EXPECT_THROW(simulate_many(bad, {.duty = duty}, 3, 2e-4), ParameterError);
 }
 
 // A supply that falls below what the bridge drops drives nothing, and nothing backwards.

@@ -401,8 +401,3 @@ def test_the_stated_brake_work_shows_a_wrong_gain():
     gross = float(simulate(CYLINDER, POINT, soc_cad=-4.0)["imep_gross_bar"])
     assert analysed(bmep_bar=gross - 1.5).attrs["warnings"] == ""
     assert "above the stated BMEP" in analysed(bmep_bar=gross - 6.5).attrs["warnings"]
-
-
-def test_the_measured_traces_are_not_doubted():
-    cylinder = presets.load("hd_diesel_128x144").cylinder
-    assert [analyze(t, cylinder, quiet=True).attrs["warnings"] for t in datasets.read("hd_diesel_128x144")] == [""] * 4
