@@ -187,7 +187,6 @@ TEST(ExtremumSeeking, ARestartHoldsTheEstimateAsTheStartDoes) {
   }
 }
 
-
 DitherSettings window(int period, std::vector<int> harmonics) {
   return {.amplitude = Inputs::Constant(static_cast<Eigen::Index>(harmonics.size()), 1.0),
           .period = period,
