@@ -50,6 +50,7 @@ def test_files_dicts_and_copies_are_exact(chain: DemandChain) -> None:
         assert twin == chain
         assert type(twin) is DemandChain
         assert hash(twin) == hash(chain)
+    assert eval(repr(chain), {"DemandChain": DemandChain, "PedalMap": PedalMap}) == chain
     assert chain.replace(leak_mm2=4.0) != chain
     assert PedalMap(**chain.pedal_map.to_dict()) == chain.pedal_map
 
