@@ -99,6 +99,21 @@ TEST(GuidedThrottle, ThePlainFormMeetsTheFactsOfP1) {
   EXPECT_LE(judged(controller, preset(1), largest, 1.44).settling_ms, 95.0);
 }
 
+TEST(GuidedThrottle, TrimAndBiasRemoveTheErrorOfASteadyTorque) {
+  ThrottleScenario s = step_scenario(30.0, 70.0, 3000);
+  s.airflow_torque_nm.assign(s.reference_deg.size(), -0.3);
+  const auto error = [&](const GuidedPredictiveSettings& settings) {
+    return judged(GuidedPredictive(settings), preset(1), s, 0.8).static_error_deg;
+  };
+  GuidedPredictiveSettings nothing = plain(0.0);
+  nothing.bias_rate_per_deg_s = 0.0;
+  const double both = error(plain()), bias = error(plain(0.0)), neither = error(nothing);
+  EXPECT_LE(both, 0.10);
+  EXPECT_LT(both, bias);
+  EXPECT_LT(bias, neither);
+  EXPECT_LE(error(learning(1)), 0.13);
+}
+
 struct Bars {
   int preset;
   double large_ms, large_p95_ms, crossing_ms, crossing_p95_ms;

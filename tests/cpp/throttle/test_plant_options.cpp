@@ -141,6 +141,11 @@ TEST(ThrottleOptions, LanesStartFromTheWholeState) {
     for (std::size_t k = 0; k < duty.size(); ++k)
       ASSERT_NEAR(many[i * duty.size() + k], angle[k], 1e-11) << i << ' ' << k;
   }
+  for (auto change : {+[](Throttle& t) { t.friction = Friction::tanh; }, +[](Throttle& t) { t.backlash = {}; }}) {
+    auto mixed = cases;
+    change(mixed[5].throttle);
+    EXPECT_THROW(simulate_many(mixed, {.duty = duty}, 3, 2e-4), ParameterError);
+  }
   EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
 }
 
