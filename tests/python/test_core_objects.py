@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from mgdd.errors import Error
 from mgdd.guide import Curve
 from mgdd.loop import VirtualEngine, VirtualThrottle, monte_carlo
-from mgdd.optimize import GaussianProcessSeeking, Limit, Spsa
+from mgdd.optimize import GaussianProcessSeeking, Input, Limit, Spsa
 from mgdd.rig import GatedThrottle
 from public_objects import bound_classes, public_objects, saved_state
 
@@ -75,6 +76,24 @@ def test_what_each_protocol_can_do_is_the_same() -> None:
         # Slots of Python itself need protocol 2.
         assert able in ([], list(range(pickle.HIGHEST_PROTOCOL + 1)), list(range(2, pickle.HIGHEST_PROTOCOL + 1))), name
         assert able != list(range(2, pickle.HIGHEST_PROTOCOL + 1)) or hasattr(type(thing), "__slots__"), name
+
+
+def test_every_number_of_a_setting_is_refused_by_its_name() -> None:
+    """Of every class of the core whose settings make it again."""
+    refused = 0
+    for cls in bound_classes().values():
+        thing = next((each for each in public_objects().values() if type(each) is cls), None)
+        settings = getattr(thing, "settings", None) or attempt(lambda thing=thing: thing.to_dict())
+        if not isinstance(settings, dict) or isinstance(attempt(lambda s=settings, c=cls: c(**s)), REFUSED):
+            continue
+        assert not hasattr(cls, "fields") or set(cls.fields()) == set(settings)
+        for name in (name for name, value in settings.items() if type(value) in (int, float)):
+            with pytest.raises(Error) as caught:
+                cls(**{**settings, name: float("nan")})
+            assert caught.value.bound
+            assert caught.value.field.endswith(name) or cls is Input, (cls, name)  # which names both of its bounds
+            refused += 1
+    assert refused > 200
 
 
 @pytest.mark.parametrize("way", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x, 0))])

@@ -29,7 +29,7 @@ from mgdd.results.units import unit_of
 from mgdd.signals import chirp
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
-from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate_throttle
+from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, simulate_throttle
 from mgdd_studies.benchmarks.drive_axis import DriveModel
 from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
 
@@ -133,22 +133,6 @@ def test_units_are_there() -> None:
     assert markup.count("<tr>") == len(Throttle.fields())
     assert "bore_mm 86 mm" in repr(presets.load("puma_single"))
     assert "% of p_max" in repr(objects()["calibration"]())
-
-
-def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
-    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), SensorDynamics(), Cylinder(bore_mm=90.0)):
-        assert max(map(len, repr(record).splitlines())) <= 100
-    names = {
-        "SensorPair": SensorPair,
-        "NoxModel": _core.engine.NoxModel,
-        "NoxProxy": _core.engine.NoxProxy,
-        "SoftSensor": SoftSensor,
-        "DemandChain": DemandChain,
-        "PedalMap": PedalMap,
-    }
-    chain = DemandChain(bore_mm=52.0, pedal_map=PedalMap.of_full_load([900.0, 5000.0], [150.0, 130.0]))
-    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), chain, chain.pedal_map):
-        assert eval(repr(record), names) == record
 
 
 def test_many_and_long_rows_are_counted_and_cut() -> None:

@@ -15,15 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mgdd import _core, presets
-from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import OdeModel, load_throttle_model
 from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.loop import SurrogatePlant
-from mgdd.presets.preset import Preset
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
@@ -168,42 +165,6 @@ def test_a_file_of_a_model_is_loaded_whatever_its_kind(tmp_path: Path) -> None:
         file = tmp_path / f"{model.kind}.toml"
         file.write_text(model.to_toml(), encoding="utf-8")
         assert load_throttle_model(file) == model
-
-
-@given(
-    values=st.fixed_dictionaries(
-        {
-            name: st.sampled_from(info["choices"]) if "choices" in info else span(0.95, 1.05)
-            for name, info in Throttle.fields().items()
-        }
-    )
-)
-@settings(max_examples=60)
-def test_a_throttle_preset_simulates_bit_for_bit_after_a_file(values: dict[str, Any]) -> None:
-    fields = Throttle.fields()
-    plain = {
-        name: value if "choices" in fields[name] else value * fields[name]["default"] for name, value in values.items()
-    }
-    plain["stiction_nm"] = 1.2 * plain["coulomb_nm"]
-    preset = Preset(
-        name="mine", title="a 'title' \"°CA\"", throttle=Throttle(**plain), sources={"throttle.bore_mm": "x"}
-    )
-    again = Preset.from_toml(preset.to_toml())
-    assert again.records == preset.records
-    runs = [simulate_throttle(one.throttle, 0.3, duration_s=0.1)["angle_deg"].to_numpy() for one in (preset, again)]
-    np.testing.assert_array_equal(*runs)
-
-
-def test_an_engine_preset_simulates_bit_for_bit_after_a_file() -> None:
-    cylinder = Cylinder(
-        burn_shape="double_wiebe", gamma_model="polynomial", wall_heat_model="hohenberg", bore_mm=85.123456789
-    )
-    point = OperatingPoint(trapped_mass_g=0.71234567890123, burn_duration_cad=33.3)
-    preset = Preset(name="mine", title="mine", cylinder=cylinder, point=point)
-    again = Preset.from_toml(preset.to_toml())
-    assert again.records == preset.records
-    one, two = (simulate_cycle(p.cylinder, p.point, soc_cad=-4.0)["pressure_bar"] for p in (preset, again))
-    np.testing.assert_array_equal(one, two)
 
 
 def test_a_sensor_pair_comes_back() -> None:

@@ -79,14 +79,12 @@ def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
         ),
         (lambda: VirtualEngine().find_optimum({"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
         (lambda: VirtualEngine().find_optimum({"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
-        (lambda: VirtualEngine().find_optimum({"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
         (lambda: VirtualEngine().find_optimum(cycle=-1), ParameterError, "cycle = -1"),
         (lambda: VirtualEngine().steady_map([-6.0], cycle=-1), ParameterError, "cycle = -1"),
         (lambda: VirtualEngine().steady_map([[1.0, 2.0]]), ShapeError, "2 dimensions"),
         (lambda: LoopCriteria(exceed_above={"p_max_bar": math.nan}), ParameterError, "exceed_above: p_max_bar = nan"),
         (lambda: run_seeker(object(), Spsa(**SPACE), 5), ParameterError, r"must have input_names, limit_names, apply"),  # type: ignore[arg-type]
         (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
-        (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: Spsa(**SPACE, limits=[Limit("a", 1.0), Limit("a", 2.0)]), ParameterError, "limit a: is given twice"),
         (lambda: Limit("", 1.0), ParameterError, "name is empty"),
         (
