@@ -197,7 +197,7 @@ def fitted_load() -> xr.Dataset:
 
 
 SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
-NEEDS = ("advisor_engine_maps", "cascaded_tanks", "emps", "h2df_502", "wh2009")
+NEEDS = ("advisor_engine_maps", "h2df_502")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),

@@ -1,4 +1,4 @@
-"""First-principle fit of a throttle log, and the fast ten-parameter fit."""
+"""First-principle fit of a throttle log."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import regression_start
 from mgdd.identify.throttle.nuisances import TYPICAL_SHARE, delay_weights
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import Model
@@ -139,27 +137,6 @@ def test_prediction_is_corrected_by_the_measurement():
     model = FirstPrincipleModel(parameters=TRUTH, substeps=4)
     ahead = model.predict(log, 20)["angle_deg"]
     np.testing.assert_allclose(ahead, log.angle_deg.values[20:], atol=1e-9)
-
-
-def test_ten_parameters_from_python_reach_the_noise_floor():
-    truth = np.array(_core.identify.smooth_example)
-    rng = np.random.default_rng(7)
-    time = 1e-3 * np.arange(8000)
-    log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(rng.uniform(-0.35, 0.35, 100), 80)})
-    noise = rng.normal(0.0, 0.05, time.size)
-    log["angle_deg"] = log["angle_deg"] + noise
-    starts = truth * rng.uniform(0.7, 1.3, (4, 10))
-    box = {"lower": 0.1 * truth, "upper": 10 * truth}
-    fit = SmoothThrottle().fit(log, start_values=starts, **box)
-    assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
-    assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
-    assert "viscous_nms_per_rad" in fit.unidentifiable
-    with pytest.raises(ShapeError, match="start_values has shape"):
-        SmoothThrottle().fit(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
-    with pytest.raises(ParameterError, match="start torque_constant"):
-        SmoothThrottle().fit(log, start_values=100 * truth, **box)
-    with pytest.raises(ParameterError, match="seed has no effect"):
-        SmoothThrottle().fit(log, start_values=truth, options=FitOptions(seed=1), **box)
 
 
 GROUPS = TRUTH | {"electrical_s": 1e-3}

@@ -16,7 +16,6 @@ from mgdd.design import design_points
 from mgdd.guide import TimingMap
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import read_conditions, read_points
@@ -186,7 +185,6 @@ SAMPLES: dict[str, Sample] = {
     "rig.RigRecord.read": Sample(RigRecord.read, "rec", _exchanges),
     "guide.TimingMap": _of_toml(TimingMap, lambda: TimingMap({"fuel_mg": [10, 20, 30]}, [-1, -2, -3]).to_toml()),
     "identify.FirstPrincipleModel": _of_toml(FirstPrincipleModel, lambda: FirstPrincipleModel().to_toml()),
-    "identify.SmoothThrottle": _of_toml(SmoothThrottle, lambda: SmoothThrottle().to_toml()),
     "surrogate.EngineSurrogate": _of_toml(EngineSurrogate, _surrogate),
     "surrogate.ResponseModel": _of_toml(ResponseModel, _response),
     "throttle.DemandChain": _of_toml(DemandChain, lambda: DemandChain().to_toml()),
