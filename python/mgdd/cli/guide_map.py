@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
@@ -24,9 +25,6 @@ from mgdd.io.files import existing_file
 from mgdd.io.parameters import ParameterFile
 from mgdd.loop import VirtualEngine
 from mgdd.loop.engine_guide import KINDS, EngineGuide
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 GUIDE = Options(EngineGuide, shape="guide_shape")
 _ENDINGS = (".csv", ".toml")

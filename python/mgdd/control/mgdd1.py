@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 _MOST_STATES = 32  # of an object that guides, as in the core
 

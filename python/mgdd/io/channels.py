@@ -6,9 +6,10 @@ import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.angle_column import Angle, angle_of, headings
@@ -19,9 +20,6 @@ from mgdd.io.reading import Reading
 from mgdd.io.table import Table
 from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.results.units import attribute_units
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Kind = Literal["pressure", "fast", "slow", "other"]
 # Of units that no expression of a units library spells so.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument
 from mgdd.io.angle_column import Angle, angle_of, at_the_speed_of_the_record, headings
@@ -24,10 +25,6 @@ from mgdd.io.pressure_checks import (
 from mgdd.io.reading import Reading
 from mgdd.io.table import Place, Table
 from mgdd.io.wrong_channel import no_pressure
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 # Cycles of one cylinder, fired or not, share their compression; another cylinder has its peak elsewhere.
 _MIN_CORRELATION = 0.5

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd import _core
 from mgdd._arguments import shown
@@ -16,9 +17,6 @@ from mgdd.maps.cells import MapTask, checked_cells, checked_label, checked_name
 from mgdd.maps.forms import MapForms
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.labels import Label
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 _TIMING = "°CA aTDC"
 

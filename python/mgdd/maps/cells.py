@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd.errors import DataError, ParameterError, ShapeError, did_you_mean
 from mgdd.results.labels import VARIABLES, Label, name_unit
 from mgdd.results.units import attribute_units, unit_of
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # Where a value comes from; the last two give why there is none.
 SOURCES = (

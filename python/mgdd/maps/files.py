@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,6 @@ from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
 
     import xarray as xr
 

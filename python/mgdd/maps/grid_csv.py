@@ -7,17 +7,15 @@ import io
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, did_you_mean
 from mgdd.io.row_text import parse_number
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import NUMBERS, TEXTS, MapTask, spoken_name
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _FORMAT = "1"
 _HEADS = ("mgdd_map", "value", "rows", "columns", "objective", "limit", "provenance")

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
 from mgdd.results.describe import described
 from mgdd.results.labels import Label
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
 # Trial time constants [cycles]; the best is refined by a parabola through its neighbours.
 _TAUS = np.r_[0.0, np.geomspace(0.5, 40.0, 36)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,6 @@ from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.results.result import Result
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy as np
     import xarray as xr
 
