@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd import datasets
 from mgdd.cli.from_library import Options
@@ -14,9 +14,6 @@ from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
 from mgdd.maps import CalibrationMap, write_map
-
-if TYPE_CHECKING:
-    from mgdd.guide import TimingMap
 
 _ENGINES = ("volkswagen", "mercedes")  # in the order of the set
 _GUIDE = (".csv", ".toml")
@@ -56,7 +53,11 @@ def _export(args: argparse.Namespace) -> None:
     if twice is not None:
         raise ParameterError(f"two maps would be called {twice!r} in {args.output}: give each a --label")
     if args.guide_map:
-        _write_guide(maps[0].to_timing_map(), args)
+        timing = maps[0].to_timing_map()
+        if Path(args.output).suffix == ".csv":
+            timing.write_csv(args.output)
+        else:
+            write_whole_text(args.output, timing.to_toml())
     elif has_labels:
         write_map(dict(zip(names, maps, strict=True)), args.output, **_WRITING.given(args))
     else:
@@ -101,13 +102,6 @@ def _lost(maps: list[CalibrationMap]) -> list[str]:
         for name, column in table.cells.items()
         if not all(str(entry) == str(plain[name][0]) for entry in column.ravel().tolist())
     ]
-
-
-def _write_guide(timing: TimingMap, args: argparse.Namespace) -> None:
-    if Path(args.output).suffix == ".csv":
-        timing.write_csv(args.output)
-    else:
-        write_whole_text(args.output, timing.to_toml())
 
 
 COMMANDS = {"export": (_add_export, _export)}

@@ -238,14 +238,10 @@ def _channel(
     reserved = name in used or re.fullmatch(r"time_\d+_s", name)
     if reserved or attribute_units(name_units or "-") != attribute_units(units or "-"):
         name = f"{name}_of_file"
-    name = _unused(name, used)
+    tried = itertools.chain([name], (f"{name}_{k}" for k in itertools.count(2)))
+    name = next(each for each in tried if each not in used)
     used.add(name)
     return Channel(name, columns, kind, units, _source(table, columns), time)
-
-
-def _unused(name: str, used: set[str]) -> str:
-    tried = itertools.chain([name], (f"{name}_{k}" for k in itertools.count(2)))
-    return next(each for each in tried if each not in used)
 
 
 def _source(table: Table, columns: Sequence[int]) -> str:

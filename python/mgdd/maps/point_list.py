@@ -44,7 +44,7 @@ def map_of_points(
         made = _of_matrix(table, name, rows, columns)
         if made is not None:
             return made
-    numeric = _numeric(table)
+    numeric = table.numeric(range(table.width))
     numbers = next((labels[k] for k in numeric if parse_number(labels[k], decimal) is not None), None)
     if numbers is not None:
         raise DataError(
@@ -114,10 +114,6 @@ def _of_columns(
         },
         provenance=notes,
     )
-
-
-def _numeric(table: Table) -> list[int]:
-    return table.numeric(range(table.width))
 
 
 def _index(table: Table, label: str | None, what: str) -> int | None:

@@ -80,7 +80,11 @@ def find_sensor_lag(
     terms: NDArray[np.float64], values: NDArray[np.float64], use: NDArray[np.bool_], *, max_delay: int, seed: int = 0
 ) -> SensorLag:
     """Find delay and time constant; `use` marks the rows of the log that count."""
-    blocks = _blocks(use)
+    edges = range(0, use.size, _BLOCK)
+    parts = [np.flatnonzero(use[start : start + _BLOCK]) + start for start in edges]
+    blocks = [part for part in parts if part.size]
+    if len(blocks) < 4:
+        raise DataError(f"{int(use.sum())} usable cycles: a sensor lag needs more than {3 * _BLOCK}")
     delays = np.arange(max_delay + 1)
     grams = np.empty((delays.size, _TAUS.size, len(blocks), terms.shape[1] + 1, terms.shape[1] + 1))
     for at, tau in enumerate(_TAUS):
@@ -112,15 +116,6 @@ def find_sensor_lag(
         total_stderr_cycles=float(np.std(many + taus, ddof=1)),
         at_bound=bool(delay == max_delay or tau >= _TAUS[-1]),
     )
-
-
-def _blocks(use: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    edges = range(0, use.size, _BLOCK)
-    parts = [np.flatnonzero(use[start : start + _BLOCK]) + start for start in edges]
-    blocks = [part for part in parts if part.size]
-    if len(blocks) < 4:
-        raise DataError(f"{int(use.sum())} usable cycles: a sensor lag needs more than {3 * _BLOCK}")
-    return blocks
 
 
 def _costs(gram: NDArray[np.float64]) -> NDArray[np.float64]:
