@@ -16,7 +16,7 @@ from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
 from mgdd.guide import FeedForward, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify import OdeModel, check_excitation, fit_cylinder, validate_throttle
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io import throttle_log
 from mgdd.loop import SensorDynamics, SurrogatePlant, VirtualEngine, run_seeker
@@ -83,8 +83,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
         "best": lambda: surrogate().find_optimum("imep_bar"),
         "surrogate engine": lambda: SurrogatePlant(surrogate()),
-        "fit": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)),
-        "report": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)).report,
+        "fit": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)),
+        "report": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(
