@@ -112,7 +112,8 @@ class Mgdd1:
         numbers: dict[str, float] = {name: each["default"] for name, each in self.fields().items()} | settings
         if strange := min(settings.keys() - self.fields().keys(), default=""):
             known = [*self.fields(), "guide", "horizon_samples", "delay_samples"]
-            raise TypeError(f"Mgdd1() has no argument {strange!r}: {did_you_mean(strange, known) or 'fields() has them'}")
+            remedy = did_you_mean(strange, known) or "fields() has them"
+            raise TypeError(f"Mgdd1() has no argument {strange!r}: {remedy}")
         self._settings: dict[str, Any] = {"horizon_samples": horizon_samples, "delay_samples": delay_samples, **numbers}
         self.guide = guide
         self._core: Any = _made(
