@@ -112,8 +112,8 @@ def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = No
             dark = np.isfinite(value) and abs(value) > 0.6
             ax.text(j, i, shown, ha="center", va="center", fontsize=size, color="white" if dark else BLACK)
             if i != j and np.isfinite(value) and abs(value) > _TANGLED:
-                edge = {"fill": False, "edgecolor": BLACK, "linewidth": 1.8}
-                ax.add_patch(Rectangle((j - 0.46, i - 0.46), 0.92, 0.92, **edge))
+                frame = Rectangle((j - 0.46, i - 0.46), 0.92, 0.92, fill=False, edgecolor=BLACK, linewidth=1.8)
+                ax.add_patch(frame)
     ax.set_xticks(range(n), names, rotation=40, ha="right", rotation_mode="anchor", fontsize="small")
     ax.set_yticks(range(n), names, fontsize="small")
     return ax

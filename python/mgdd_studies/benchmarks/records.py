@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -215,4 +216,8 @@ def _wiener_hammerstein(file: Path) -> tuple[xr.Dataset, xr.Dataset]:
     return record(slice(0, 100_000), "estimation"), record(slice(100_000, None), "test")
 
 
-_READERS = {"cascaded_tanks": _cascaded_tanks, "emps": _emps, "wh2009": _wiener_hammerstein}
+_READERS: dict[str, Callable[..., tuple[xr.Dataset, xr.Dataset]]] = {
+    "cascaded_tanks": _cascaded_tanks,
+    "emps": _emps,
+    "wh2009": _wiener_hammerstein,
+}
