@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.array_table import ArrayTable
@@ -18,10 +18,7 @@ from mgdd.maps.cells import cell_at
 from mgdd.maps.plain_grid import number_in, require_two, value_heading
 from mgdd.maps.written import NOT_GIVEN, Heading, heading_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 _SHOWN = 3  # cells that a message names
 _NUMBERED = re.compile(r"(.*?) ?(\d+)")
