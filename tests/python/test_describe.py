@@ -16,9 +16,8 @@ from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
 from mgdd.guide import FeedForward, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify import OdeModel, check_excitation, fit_cylinder, validate_throttle
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.loop import SensorDynamics, SurrogatePlant, VirtualEngine, run_seeker
 from mgdd.maps import CalibrationMap
@@ -43,7 +42,6 @@ def objects() -> dict[str, Callable[[], Any]]:
         run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
-    example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
     seeking = {"start": -20.0, "lower": -30.0, "upper": 10.0}
     return {
         "engine preset": lambda: presets.load("puma_single"),
@@ -74,7 +72,6 @@ def objects() -> dict[str, Callable[[], Any]]:
         "pw_r": lambda: PseudoWiener("pw_r"),
         "pw_p": lambda: PseudoWiener("pw_p", {"plays": 8.0}),
         "first principle": FirstPrincipleModel,
-        "smooth": lambda: SmoothThrottle(parameters=example),
         "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, initial_state=(0.0,)),
         "drive": lambda: DriveModel(parameters={"mass_kg": 95.0}, force_n_per_v=35.0),
         "filter": lambda: LinearApproximation(
@@ -86,8 +83,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
         "best": lambda: surrogate().find_optimum("imep_bar"),
         "surrogate engine": lambda: SurrogatePlant(surrogate()),
-        "fit": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)),
-        "report": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)).report,
+        "fit": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)),
+        "report": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(

@@ -221,15 +221,6 @@ def sensors() -> Call:
 
 
 @batch
-def smooth_throttle() -> Call:
-    constants = {"inertia_kgm2": 0.002, "gear_ratio": 20.0, "inductance_h": 1e-3, "supply_v": 12.0}
-    values = list(_core.identify.smooth_example)
-    return partial(
-        _core.identify.simulate_smooth_throttle, values, DUTY, step_s=1e-3, start=[0.1, 0.0, 0.0], **constants
-    )
-
-
-@batch
 def throttle_groups() -> Call:
     values = [0.5 * (bound.lower + bound.upper) for bound in _core.identify.throttle_group_bounds()]
     frame = {"closed_deg": 0.0, "open_deg": 90.0, "substeps": 2}

@@ -33,7 +33,7 @@ from mgdd.engine import (
 )
 from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import (
@@ -197,7 +197,7 @@ def fitted_load() -> xr.Dataset:
 
 
 SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
-NEEDS = ("advisor_engine_maps", "cascaded_tanks", "emps", "h2df_502", "wh2009")
+NEEDS = ("advisor_engine_maps", "h2df_502")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
@@ -236,10 +236,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "results.FitReport.dataset": lambda _: report().dataset,
-    "results.Fit.dataset": lambda _: fit_first_principle(
-        log(), options=optimize.FitOptions(n_starts=1)
-    ).dataset,
-    "results.Fit.run": lambda _: fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
+    "results.Fit.dataset": lambda _: fit_groups(log(), delays=[0.0], options=optimize.FitOptions(n_starts=1)).dataset,
+    "results.Fit.run": lambda _: fit_groups(log(), delays=[0.0], options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "guide.FeedForward.history": lambda _: guided().history,
     "guide.GuidedEngine.history": lambda _: guided_engine().history,

@@ -22,7 +22,7 @@ from mgdd import datasets, identify, io, plot, presets
 from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignition_delay, simulate
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
@@ -56,7 +56,7 @@ def cylinder_fit() -> Any:
 
 @cache
 def throttle_fit() -> Any:
-    return fit_first_principle(log(), options=FitOptions(n_starts=1))
+    return fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1))
 
 
 @cache

@@ -14,8 +14,6 @@ from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +18,8 @@ from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, OwnSeeker, require_inputs_of
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult, found_by
-from mgdd.optimize import GaussianProcessSeeking, Seeker
+from mgdd.optimize import ComponentLag, GaussianProcessSeeking, Input, Limit, Seeker
 from mgdd.optimize.inputs import inputs_of, named_values
-
-if TYPE_CHECKING:
-    from mgdd.optimize import ComponentLag, Input, Limit
 
 _MOST_CYCLES = 2_000_000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from mgdd.loop.front_result import FrontResult, front_of
 from mgdd.loop.lower_limits import middle_of
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.seek import plant_of, seek_inputs, started
-from mgdd.optimize import GaussianProcessSeeking
+from mgdd.optimize import GaussianProcessSeeking, Input, Limit
 from mgdd.optimize.optimum import limits_of
-
-if TYPE_CHECKING:
-    from mgdd.optimize import Input, Limit
 
 _ENDS = 0.3  # share of the cycles that looks for the best of each objective alone
 _NEAREST = 6

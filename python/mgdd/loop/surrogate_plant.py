@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd._core.optimize import Limit
 from mgdd.errors import DataError, ParameterError, RigError
@@ -16,9 +17,6 @@ from mgdd.results.describe import described
 from mgdd.surrogate.points import farthest_inside
 from mgdd.surrogate.signal_model import decay_of
 from mgdd.surrogate.surrogate import EngineSurrogate
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LEVERAGE = "leverage_share"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -16,8 +17,6 @@ from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 

@@ -7,19 +7,16 @@ import math
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd._arguments import shown
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError, argument, did_you_mean
 from mgdd.results.labels import VARIABLES, Label
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 _TIMING = "soc_cad"
 _REMARK = re.compile(r"[,;] (0|none) = .*")  # what a value stands for is not a name for an axis

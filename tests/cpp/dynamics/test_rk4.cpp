@@ -29,6 +29,10 @@ struct Lag {
   }
 };
 
+// A model of any equation does not know a state at rest for an output.
+using LagModel = decltype(Rk4<Lag>{}.prepare(std::array{1.0, 1.0, 1.0}, 1.0));
+static_assert(DiscreteModel<LagModel> && !StartsAtRest<LagModel>);
+
 TEST(Rk4, IsItsStabilityPolynomialOnALinearEquation) {
   const double a = -1.7, b = 0.6, c = 3.0, h = 0.4, u = 1.3, x0 = 0.8;
   const auto model = Rk4<Lag>{}.prepare(std::array{a, b, c}, h);

@@ -8,7 +8,6 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
-#include "mgdd/throttle/models/smooth.hpp"
 #include "mgdd/throttle/sensors.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
@@ -76,28 +75,6 @@ TEST(ThrottleNumbers, TheClosingTorqueOfTheAirIsTheLineThroughItsTable) {
   EXPECT_EQ(airflow_coefficient(91.0), 0.0);
   EXPECT_EQ(airflow_coefficient(NAN), 0.0);
   EXPECT_NEAR(airflow_torque_nm(asymmetric_throttle(), 60.0), -0.052 * 0.052 * 0.052 * 7000.0 * 0.060, 1e-15);
-}
-
-TEST(SmoothPlant, SolvesItsEquations) {
-  const SmoothPlant plant{.inertia_kgm2 = 3e-3, .gear_ratio = 17.0, .inductance_h = 2e-3, .supply_v = 13.0};
-  const std::array<double, 10> p{0.016, 4e-3, 0.12, 0.5, 0.13, 0.25, 0.02, 0.14, 0.018, 1.2};
-  const auto c = plant.coefficients(p);
-  for (const double away : {-0.05, -0.01, 0.01, 0.2}) {
-    for (const double speed : {-3.0, -0.2, 0.4, 2.0}) {
-      const std::array<double, 3> x{0.14 + away, speed, 0.7};
-      const auto dx = plant.derivative(c, x, std::array<double, 1>{0.3});
-      const double torque = 17.0 * 0.016 * 0.7 - 4e-3 * speed - 0.12 * std::tanh(speed / 0.5) - 0.13 * away -
-                            0.25 * std::tanh(away / 0.02);
-      EXPECT_NEAR(dx[0], speed, 1e-15);
-      EXPECT_NEAR(dx[1], torque / 3e-3, 1e-9);
-      EXPECT_NEAR(dx[2], (13.0 * 0.3 - 1.2 * 0.7 - 17.0 * 0.018 * speed) / 2e-3, 1e-9);
-      EXPECT_NEAR(plant.output(c, x), (0.14 + away) * 180.0 / M_PI, 1e-12);
-    }
-  }
-  EXPECT_EQ(SmoothPlant{}, (SmoothPlant{2e-3, 20.0, 1e-3, 12.0}));
-  EXPECT_EQ(SmoothPlant::n_states, 3);
-  EXPECT_EQ(SmoothPlant::n_inputs, 1);
-  EXPECT_EQ(SmoothPlant::n_parameters, 10);
 }
 
 }  // namespace
