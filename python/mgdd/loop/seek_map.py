@@ -112,8 +112,8 @@ def seek_map(
     seeker : MapSeeking, optional
         Go on with that of an earlier result, which changes; it has inputs, axes, limits and guide of its own.
     record : path-like, optional
-        A CSV file with a row per visit. Where it holds some, the search goes on behind them as if it had never stopped; a
-        record of another search is refused.
+        A CSV file with a row per visit. Where it holds some, the search goes on behind them as if it had never stopped;
+        a record of another search is refused.
     on_visit : callable, optional
         Called after every visit with its `Progress`.
     settings : mapping of str to any, optional
