@@ -96,7 +96,7 @@ def contenders(duty, angle, start, lower, upper):
 
     def ours(p):
         fit = SmoothThrottle().fit(
-            record(duty, angle), start_values=p, lower=lower, upper=upper, initial_state=start,
+            record(duty, angle), start_values=p, bounds=(lower, upper), initial_state=start,
             options=FitOptions(tolerance=TOLERANCE),
         )  # fmt: skip
         return fit.report.rmse, fit.report.nfev
@@ -145,9 +145,7 @@ def measure(name: str, options: argparse.Namespace) -> dict:
     times = []
     for _ in range(options.repeats):
         begin = time.process_time()
-        fit = SmoothThrottle().fit(
-            record(duty, angle), start_values=starts, lower=lower, upper=upper, initial_state=start
-        )
+        fit = SmoothThrottle().fit(record(duty, angle), start_values=starts, bounds=(lower, upper), initial_state=start)
         times.append(time.process_time() - begin)
     rows["mgdd, all starts in lanes"] = {
         "total_s": statistics.median(times),

@@ -44,7 +44,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
     example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
-    seeking = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+    seeking = {"start": -20.0, "bounds": (-30.0, 10.0)}
     return {
         "engine preset": lambda: presets.load("puma_single"),
         "throttle preset": lambda: presets.load("P1"),

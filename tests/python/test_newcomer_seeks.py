@@ -82,7 +82,7 @@ def a_seeker_by_class_with_settings() -> bool:
 
 
 def a_seeker_of_my_own() -> bool:
-    seeker = ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0)
+    seeker = ExtremumSeeking(start=-10.0, bounds=(-30.0, 10.0))
     return abs(seek(VirtualEngine(seed=1), seeker=seeker, cycles=600).inputs["soc_cad"] + 5.63) < 2.0
 
 

@@ -51,7 +51,7 @@ def test_summary_dataset_and_figures(name: str, request: pytest.FixtureRequest) 
 
 
 def test_without_figures_and_with_seeds() -> None:
-    result = run_study("nox-sensors", seeds=1, figures=False)
+    result = run_study("nox-sensors", n_seeds=1, figures=False)
     assert result.figures == {}
     assert result.summary["seeds"] == 1
     assert result.summary["rows"][0]["steady_error_percent_low"] is None  # one seed says nothing of its spread

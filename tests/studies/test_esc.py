@@ -88,7 +88,7 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="2 finished rows") as stop:
-        run_sensor_delay(seeds=2, figures=True, progress=stop_at_the_third)
+        run_sensor_delay(n_seeds=2, figures=True, progress=stop_at_the_third)
     result = stop.value.partial
     assert result.summary["interrupted"] is True
     assert len(result.summary["rows"]) == 2
@@ -109,7 +109,7 @@ def test_ctrl_c_in_the_first_part_of_a_later_group_keeps_the_earlier_ones() -> N
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="7 finished rows") as stop:
-        run_sensor_delay(seeds=1, quick=True, figures=False, progress=press)
+        run_sensor_delay(n_seeds=1, quick=True, figures=False, progress=press)
     part = stop.value.partial
     assert len(part.summary["rows"]) == 7
     assert part.summary["component_wise"] == []
@@ -119,8 +119,8 @@ def test_bad_requests_are_named() -> None:
     with pytest.raises(ParameterError, match=r"study = 'nothing': must be one of .*sensor-delay"):
         run_study("nothing")
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
-        run_study("sensor-delay", seeds=0)
+        run_study("sensor-delay", n_seeds=0)
     with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes seeds"):
         run_study("sensor-delay", traces=[])
     with pytest.raises(ParameterError, match="'measured-traces' is deterministic"):
-        run_study("measured-traces", seeds=3)
+        run_study("measured-traces", n_seeds=3)

@@ -113,7 +113,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
     def of_guide(
         cls,
         guide: Callable[[Any], Any],
-        points: Mapping[str, ArrayLike],
+        over: Mapping[str, ArrayLike],
         *,
         make: Callable[..., Any],
         **settings: float,
@@ -124,7 +124,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         ----------
         guide : callable
             For example a `ModelOptimum`.
-        points : mapping of str to array_like
+        over : mapping of str to array_like
             The axes.
         make : callable
             ``make(**numbers)`` gives the operating point of a cell, for example `mgdd.engine.OperatingPoint`.
@@ -150,7 +150,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         >>> round(timing(OperatingPoint(speed_rpm=1200, fuel_mg=20)), 1)
         -3.5
         """
-        own = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in points.items()}
+        own = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in over.items()}
         cells = np.stack(np.meshgrid(*own.values(), indexing="ij"), axis=-1).reshape(-1, len(own))
         values = []
         for cell in cells.tolist():

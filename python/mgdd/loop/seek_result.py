@@ -61,6 +61,11 @@ class Readings:
         self.counts = ~data["void"].to_numpy().astype(bool)
         self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
 
+    @property
+    def measured(self) -> list[str]:
+        """Names of the quantities that may be limited."""
+        return [str(name) for name in self._data["limit"].values] if "limits" in self._data else []
+
     def limit(self, name: str) -> NDArray[np.float64]:
         """Give the readings of a limit, NaN where the cycle does not count."""
         if "limits" not in self._data:
@@ -174,6 +179,10 @@ def _about_limits(readings: Readings, asked: Question, estimates: Mapping[str, M
         names = tuple(measured_names(asked.limits))
         text = f"no start given, and it is unknown where {', '.join(names)} would hold: it began where that was open"
         yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
+    idle = dict.fromkeys(plain_name(name)[0] for name in readings.measured)
+    if names := tuple(name for name in idle if name not in measured_names(asked.limits)):
+        text = f"{', '.join(names)}: measured, but no limit on it is kept"
+        yield Finding("limit_not_kept", names, text, f"a plant only measures: give the value in {argument('limits')}")
     for limit in asked.limits:
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
@@ -193,6 +202,9 @@ def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> I
     if doubts > 1 + cycles // _PER_DOUBT:
         text = f"readings were not explained by earlier ones, {doubts} times: J drifts or jumps"
         yield Finding("unexplained", (), text, "look at what else changes; the newest readings count")
+    if asked.own_model:
+        text = "the guide is the model that the plant is made of: no engine has so good a guide"
+        yield Finding("own_model", (), text, "change its cylinder, as Cylinder(wall_heat_scale=1.0)")
     if getattr(seeker, "handed_over", False):
         which = "of the guide" if guided else "of a parabola"
         text = f"the shape {which} did not explain the readings, and extremum seeking took over"

@@ -287,7 +287,7 @@ def _encode(value: Any) -> Any:
         return {"surface": [value.axes, value.values.ravel().tolist()]}
     if isinstance(value, dict):
         return {name: _encode(item) for name, item in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [_encode(item) for item in value]
     return value
 

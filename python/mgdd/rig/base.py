@@ -166,7 +166,7 @@ class ActuatorGuard(AroundPlant):
     >>> guard = ActuatorGuard(
     ...     bench, start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)}, limits=[Limit("p_max_bar", 80.0)]
     ... )
-    >>> run = run_seeker(guard, ExtremumSeeking(start=0.0, lower=-30.0, upper=10.0), 400)
+    >>> run = run_seeker(guard, ExtremumSeeking(start=0.0, bounds=(-30.0, 10.0)), 400)
     >>> guard.counts["limit"] > 0, float(run.dataset["applied"][:, 0].min()) >= -12.0
     (True, True)
     """

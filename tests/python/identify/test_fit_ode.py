@@ -141,7 +141,7 @@ def test_python_and_the_core_agree_on_one_problem():
     run = SmoothThrottle(parameters=found.model.parameters).simulate(log)["angle_deg"]
     assert float(((run - log["angle_deg"]) ** 2).sum()) == pytest.approx(2 * found.report.cost, rel=1e-9)
     # The core's ten-parameter fit cannot be worse than four parameters at the same place.
-    core = SmoothThrottle().fit(log, start_values=values, lower=0.1 * truth, upper=10 * truth)
+    core = SmoothThrottle().fit(log, start_values=values, bounds=(0.1 * truth, 10 * truth))
     assert core.report.cost <= found.report.cost
 
 

@@ -149,13 +149,13 @@ def test_ten_parameters_from_python_reach_the_noise_floor():
     noise = rng.normal(0.0, 0.05, time.size)
     log["angle_deg"] = log["angle_deg"] + noise
     starts = truth * rng.uniform(0.7, 1.3, (4, 10))
-    box = {"lower": 0.1 * truth, "upper": 10 * truth}
+    box = {"bounds": (0.1 * truth, 10 * truth)}
     fit = SmoothThrottle().fit(log, start_values=starts, **box)
     assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
     assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
     assert "viscous_nms_per_rad" in fit.unidentifiable
     with pytest.raises(ShapeError, match="start_values has shape"):
-        SmoothThrottle().fit(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
+        SmoothThrottle().fit(log, start_values=[1.0, 2.0], bounds=(truth, truth))
     with pytest.raises(ParameterError, match="start torque_constant"):
         SmoothThrottle().fit(log, start_values=100 * truth, **box)
     with pytest.raises(ParameterError, match="seed has no effect"):

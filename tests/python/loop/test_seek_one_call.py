@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mgdd.engine import Cylinder
 from mgdd.errors import DataError, Error, Interrupted, ParameterError, ShapeError
 from mgdd.guide import Curve
-from mgdd.loop import Measurement, VirtualEngine, run_seeker, seek
+from mgdd.loop import EngineGuide, Measurement, VirtualEngine, run_seeker, seek
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize import GaussianProcessSeeking, Input
 
@@ -139,6 +140,22 @@ def test_a_limit_that_bends_is_read_before_it_is_reached() -> None:
         bench = VirtualEngine(seed=seed, limits=["p_max_bar"])
         found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": 95.0}, cycles=40, seed=seed)
         assert 90.0 < float(found.dataset["noise_free_limits"].max()) < 96.0
+
+
+def test_limits_of_the_engine_alone_are_measured_and_not_kept() -> None:
+    """Values given to the engine do not limit a search, and those of the search count where both have some."""
+    early, capped = {"soc_cad": (-30.0, 10.0)}, {"p_max_bar": 95.0}
+    alone = seek(VirtualEngine(seed=1, limits=capped), early, cycles=40)
+    assert "limit_not_kept" in codes(alone)
+    both = seek(VirtualEngine(seed=1, limits={"p_max_bar": 300.0}), early, limits=capped, cycles=40)
+    assert "limit_not_kept" not in codes(both)
+    assert both.limits["p_max_bar"] < 96.0 < float(alone.dataset["limits"][-1, 0])
+
+
+def test_a_guide_that_is_the_model_of_the_plant_is_a_finding() -> None:
+    for wall_heat, own in ((0.5, True), (1.0, False)):
+        guide = EngineGuide(cylinder=Cylinder(wall_heat_scale=wall_heat))
+        assert ("own_model" in codes(seek(VirtualEngine(), ONE, guide=guide, cycles=12))) is own
 
 
 def test_a_start_that_nobody_knows_to_be_safe_is_a_finding() -> None:

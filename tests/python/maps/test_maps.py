@@ -159,7 +159,7 @@ def test_the_guide_uses_a_map_and_what_it_learns_comes_back() -> None:
     assert table.learned_from(timing) == table  # nothing learnt yet
 
     optimum = -7.5
-    seeker = FeedForward(ExtremumSeeking(start=-5.0, lower=-30.0, upper=10.0), timing)
+    seeker = FeedForward(ExtremumSeeking(start=-5.0, bounds=(-30.0, 10.0)), timing)
     point = {"speed_rpm": 1400.0, "fuel_mg": 14.0}
     seeker.at(point)
     assert seeker.ask()[0] == pytest.approx(centre(1400.0, 14.0), abs=3.0)

@@ -60,7 +60,7 @@ def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> No
         from mgdd.throttle import Throttle
 
         def loops(**how):
-            seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+            seeker = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
             return monte_carlo(VirtualEngine(), seeker, range(20_000), cycles=1000, **how), "mean_soc_cad"
 
         def tracks(**how):

@@ -12,7 +12,7 @@ from mgdd.loop import LoopCriteria, VirtualEngine, monte_carlo
 from mgdd.optimize import ExtremumSeeking, GradientDescent, Limit, Spsa
 from mgdd.parallel.chunks import Plan
 
-SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -12.0, "bounds": (-30.0, 10.0)}
 
 
 def loops(**how: Any) -> xr.Dataset:

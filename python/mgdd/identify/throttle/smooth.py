@@ -93,8 +93,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
         record: Any,
         *,
         start_values: ArrayLike,
-        lower: ArrayLike,
-        upper: ArrayLike,
+        bounds: tuple[ArrayLike, ArrayLike],
         initial_state: Mapping[str, float] | Sequence[float] | None = None,
         options: FitOptions | None = None,
     ) -> Fit:
@@ -110,8 +109,8 @@ class SmoothThrottle(SampledModel, ModelParameters):
             ``duty`` [-] and ``angle_deg`` [deg] over an evenly spaced ``time_s`` [s].
         start_values : array_like, shape (n_starts, 10) or (10,)
             In the order of `parameters`.
-        lower, upper : array_like, shape (10,)
-            Bounds, positive.
+        bounds : pair of array_like, each of shape (10,)
+            Least and largest values, positive.
         initial_state : mapping of str to float, or sequence of float, optional
             Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; at rest without.
         options : FitOptions, optional
@@ -147,8 +146,8 @@ class SmoothThrottle(SampledModel, ModelParameters):
         how: dict[str, Any] = {
             "duty": duty,
             "angle_deg": angle,
-            "lower": _ten(lower, "lower"),
-            "upper": _ten(upper, "upper"),
+            "lower": _ten(bounds[0], "bounds[0]"),
+            "upper": _ten(bounds[1], "bounds[1]"),
             "step_s": even_step(time),
             "start": state,
             **self.constants,
