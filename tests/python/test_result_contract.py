@@ -279,4 +279,4 @@ def test_a_run_of_several_inputs_has_a_panel_each() -> None:
     )  # fmt: skip
     run = run_seeker(SurrogatePlant(surrogate, inputs=["soi_cad", "doi_main_ms"]), seeker, 40)
     labels = [panel.get_ylabel() for panel in run.plot().figure.axes]
-    assert labels[:3] == ["soi_cad [°CA aTDC]", "doi_main_ms [ms]", "J [unit of J]"]
+    assert labels[:3] == ["soi_cad [°CA aTDC]", "doi_main_ms [ms]", "imep [bar]"]

@@ -120,7 +120,7 @@ def test_bad_requests_are_named() -> None:
         run_study("nothing")
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
         run_study("sensor-delay", n_seeds=0)
-    with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes seeds"):
+    with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes n_seeds"):
         run_study("sensor-delay", traces=[])
     with pytest.raises(ParameterError, match="'measured-traces' is deterministic"):
         run_study("measured-traces", n_seeds=3)

@@ -205,7 +205,7 @@ def _run_of(
     *,
     interrupted: bool,
 ) -> LoopRun:
-    dataset = dataset_of(cycles, first, plant.input_names, guided)
+    dataset = dataset_of(cycles, first, plant, guided)
     dataset.attrs |= {"interrupted": int(interrupted), **criteria.attributes(tuple(plant.limit_names), uppers)}
     summary = Figures(summarize_cycles(dataset, criteria))
     return LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)

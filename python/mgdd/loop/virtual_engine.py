@@ -15,7 +15,7 @@ from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError, hinted
 from mgdd.loop.lower_limits import measured_names
 from mgdd.loop.plant import Measurement, checked_inputs
-from mgdd.loop.plant_record import cycles_to_dataset
+from mgdd.loop.plant_record import cycles_to_dataset, weights_of
 from mgdd.loop.steady import find_optimum, limits_to_keep, split_inputs, steady_map
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum, limit_names_of
@@ -122,6 +122,11 @@ class VirtualEngine(_core.loop.VirtualEngine):
     def limit_names(self) -> tuple[str, ...]:
         """Names of the limited quantities that a cycle reports."""
         return tuple(self.settings["limits"])
+
+    @property
+    def objective(self) -> dict[str, float]:
+        """Weights of the quantities in J by name; empty where a term is not a plain multiple of one."""
+        return weights_of(self.settings["performance"])
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next cycle.

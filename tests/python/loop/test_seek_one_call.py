@@ -5,13 +5,14 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mgdd.engine import Cylinder
+from mgdd.engine import Cylinder, Performance
 from mgdd.errors import DataError, Error, Interrupted, ParameterError, ShapeError
 from mgdd.guide import Curve
 from mgdd.loop import EngineGuide, Measurement, VirtualEngine, run_seeker, seek
@@ -156,6 +157,17 @@ def test_a_guide_that_is_the_model_of_the_plant_is_a_finding() -> None:
     for wall_heat, own in ((0.5, True), (1.0, False)):
         guide = EngineGuide(cylinder=Cylinder(wall_heat_scale=wall_heat))
         assert ("own_model" in codes(seek(VirtualEngine(), ONE, guide=guide, cycles=12))) is own
+
+
+@pytest.mark.parametrize(
+    ("performance", "name"),
+    [(None, "efficiency"), (Performance.efficiency_and_nox(0.004), "efficiency_percent -0.004 nox_ppm")],
+)
+def test_j_has_the_name_and_the_unit_of_the_objective(performance: Performance | None, name: str) -> None:
+    found = seek(VirtualEngine(performance=performance), ONE, cycles=12)
+    assert re.search(rf"\n +{name} [\d.]+ ± [\d.]+ %\n +gain", found.summary())
+    assert found.dataset["gain"].attrs == {"units": "percent", "long_name": f"gain of {name} over the start"}
+    assert [panel.get_ylabel().replace("\n−", " -") for panel in found.plot().figure.axes][1] == f"{name} [%]"
 
 
 def test_a_start_that_nobody_knows_to_be_safe_is_a_finding() -> None:
