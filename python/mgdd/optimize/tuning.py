@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.optimize.direct_seekers import ExtremumSeeking, Spsa
-from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers, inputs_of, named_values
+from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers, bounds_pair, inputs_of, named_values
 from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.tuning_forms import check_wish, coupling_of, hessian_of, of_each, per_input, tuned
 
@@ -135,7 +135,7 @@ class Tuning(InputNumbers):
         self,
         *,
         start: PerInput,
-        bounds: tuple[Any, Any] | Mapping[str, tuple[float, float]] = (-math.inf, math.inf),
+        bounds: tuple[Any, Any] | Mapping[str, tuple[float, float]] | None = None,
         inputs: Mapping[str, tuple[float, float]] | Sequence[_core.optimize.Input] | None = None,
         maximize: bool = True,
         limits: Mapping[str, float] | Sequence[_core.optimize.Limit] = (),
@@ -148,7 +148,7 @@ class Tuning(InputNumbers):
         ----------
         start : float, array_like or mapping of str to float
             First estimate, in the unit of the input and the order of this tuning.
-        bounds : pair of float or array_like, or mapping of str to (float, float)
+        bounds : pair of float or array_like, or mapping of str to (float, float), optional
             Least and largest applied input, per input; the start must lie inside by `amplitude`. By name where this
             tuning has names.
         inputs : mapping of str to (float, float), or sequence of Input, optional
@@ -181,11 +181,9 @@ class Tuning(InputNumbers):
         names = tuple(one.name for one in given)
         if self.inputs and not given:
             names = self.inputs
-            by_name = named_values("bounds", bounds, names)
-            low, high = zip(*by_name, strict=True) if isinstance(bounds, Mapping) else by_name
-            each_bound = zip(names, *np.broadcast_arrays(low, high, np.zeros(len(names)))[:2], strict=True)
-            given = tuple(_core.optimize.Input(name, float(a), float(b)) for name, a, b in each_bound)
-        elif given and bounds != (-math.inf, math.inf):
+            sides = np.broadcast_arrays(*bounds_pair(bounds, names), np.zeros(len(names)))[:2]
+            given = tuple(_core.optimize.Input(*one) for one in zip(names, *np.asarray(sides).tolist(), strict=True))
+        elif given and bounds is not None:
             raise ParameterError("bounds: inputs hold them: leave these out")
         if self.inputs and set(names) != set(self.inputs):
             raise ParameterError(f"inputs are {', '.join(names)}: this was tuned for {', '.join(self.inputs)}")

@@ -72,7 +72,7 @@ def seeking(
     >>> from mgdd.optimize import ExtremumSeeking
     >>> run = run_seeker(VirtualEngine(nox_sensor="none"), ExtremumSeeking(start=-16.0), 60).dataset
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
-    ['soc_cad [°CA aTDC]', 'J [unit of J]']
+    ['soc_cad [°CA aTDC]', 'efficiency [%]']
     """
     run = require("run", run, (), _MADE_BY)
     sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")

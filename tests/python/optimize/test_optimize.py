@@ -215,7 +215,8 @@ def test_a_model_that_changes_its_number_of_residuals_is_refused():
     ("arguments", "error", "message"),
     [
         ({"x0": [np.nan, 1.0]}, ParameterError, "start of x0 = nan"),
-        ({"x0": [-1.2, 9.0], "bounds": (-np.inf, 5.0)}, ParameterError, "start of x1 = 9: must be finite and in"),
+        ({"x0": [-1.2, 9.0], "bounds": (None, 5.0)}, ParameterError, "start of x1 = 9: must be finite and in"),
+        ({"bounds": "ab"}, ParameterError, "bounds = 'ab': must be a pair"),
         ({"bounds": ([1.0, 1.0], 0.0)}, ParameterError, "x0: lower = 1 must be < upper = 0"),
         ({"log_scaled": [False, True]}, ParameterError, "x1: lower = -inf must be > 0"),
         ({"names": ["a", "a"]}, ParameterError, "'a' appears twice"),

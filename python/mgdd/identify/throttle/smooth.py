@@ -14,6 +14,7 @@ from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.identify.starts import rank
 from mgdd.io.parameters import ModelParameters, wanted
+from mgdd.optimize.inputs import bounds_pair
 from mgdd.optimize.least_squares import FitOptions, fit_of, fit_options, fit_run
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results import Fit
@@ -146,8 +147,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
         how: dict[str, Any] = {
             "duty": duty,
             "angle_deg": angle,
-            "lower": _ten(bounds[0], "bounds[0]"),
-            "upper": _ten(bounds[1], "bounds[1]"),
+            **{side: _ten(each, side) for side, each in zip(("lower", "upper"), bounds_pair(bounds), strict=True)},
             "step_s": even_step(time),
             "start": state,
             **self.constants,
