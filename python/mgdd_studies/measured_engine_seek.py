@@ -111,7 +111,7 @@ def run_measured_engine_seek(
     >>> from mgdd import datasets
     >>> from mgdd_studies.measured_engine_seek import run_measured_engine_seek
     >>> if "h2df_502" in datasets.names():
-    ...     result = run_measured_engine_seek(seeds=1, quick=True, figures=False)
+    ...     result = run_measured_engine_seek(n_seeds=1, quick=True, figures=False)
     ...     assert len(result.summary["rows"]) == 7
     """
     n_seeds = check_seeds(n_seeds, quick=quick, most=_QUICK_SEEDS)

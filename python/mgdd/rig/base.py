@@ -46,6 +46,11 @@ class AroundPlant:
         return self.plant.limit_names
 
     @property
+    def objective(self) -> Mapping[str, float]:
+        """Weights of the quantities in J, by name; empty where the plant does not say."""
+        return getattr(self.plant, "objective", {})
+
+    @property
     def operating_point_changes(self) -> bool:
         """Whether the next cycle brings a new operating point; False for a plant that announces none."""
         return bool(getattr(self.plant, "operating_point_changes", False))
