@@ -35,7 +35,7 @@ from mgdd.optimize import ExtremumSeeking, Limit, Spsa
 from mgdd.throttle import SensorPair, Throttle
 
 PRESET = presets.load("puma_single")
-SEEKER = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+SEEKER = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 LEAK = re.compile(r"incompatible (function|constructor) arguments|Unable to cast|instance has no|pybind11")
 
 
@@ -104,7 +104,7 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: ExtremumSeeking(start=0.0, period="x"), "period", "period = 'x': must be a whole number"),
         (lambda: ExtremumSeeking(start="x"), "start", "start = 'x': must be"),
         (lambda: Spsa(start=0.0, limits=[3.0]), "limits", r"limits = \[3.0\], a list: must be a sequence of Limits"),
-        (lambda: VirtualEngine([Cylinder()]), "engine", "engine = .*: must be a Cylinder"),
+        (lambda: VirtualEngine([Cylinder()]), "cylinder", "cylinder = .*: must be a Cylinder"),
         (lambda: VirtualEngine(point=[OperatingPoint()]), None, "OperatingPoint"),
         (lambda: VirtualEngine().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
         (lambda: VirtualEngine().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),
@@ -171,7 +171,7 @@ def test_numbers_that_carry_a_unit_are_refused_and_not_read_as_radians(soc: str)
     with pytest.raises(ParameterError, match=r"magnitude"):
         find_optimum(PRESET.cylinder, PRESET.point, bounds_cad=(-20 * quantity.degree, 5 * quantity.degree))
     with pytest.raises(ParameterError, match=r"start = .*magnitude"):
-        ExtremumSeeking(start=given, lower=-30.0, upper=10.0)
+        ExtremumSeeking(start=given, bounds=(-30.0, 10.0))
     with pytest.raises(ParameterError, match=r"limp_home_deg = .*magnitude"):
         Throttle(limp_home_deg=7 * quantity.degree)
     curve = Curve.parabola(curvature=-0.05, best=3.0, reach=60.0)

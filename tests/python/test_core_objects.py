@@ -130,7 +130,7 @@ def test_object_that_was_never_made_is_a_type_error(name: str) -> None:
 def test_object_that_was_never_made_is_no_argument_either() -> None:
     limit = Limit.__new__(Limit)
     with pytest.raises(TypeError, match="never made"):
-        Spsa(start=0.0, lower=-1.0, upper=1.0, limits=[limit])
+        Spsa(start=0.0, bounds=(-1.0, 1.0), limits=[limit])
     with pytest.raises(TypeError, match="never made"):
         assert limit != Limit("p_max_bar", upper=90.0)
 
@@ -144,7 +144,7 @@ def test_frame_of_a_constructor_that_raised_can_be_shown() -> None:
             super().__init__(**keywords)
 
     with pytest.raises(Exception, match="lower"):
-        Kept(start=0.0, lower=1.0, upper=-1.0)
+        Kept(start=0.0, bounds=(1.0, -1.0))
     with pytest.raises(TypeError, match="never made"):
         repr(held[0])
 
@@ -160,7 +160,7 @@ def test_curve_is_not_read_where_nothing_is(value: Any) -> None:
 def test_only_the_seed_of_the_run_counts(seeker: Any, misfires: float) -> None:
     ends = []
     for made in (0, 5):
-        start = seeker(start=-2.0, lower=-20.0, upper=10.0, seed=made)
+        start = seeker(start=-2.0, bounds=(-20.0, 10.0), seed=made)
         run = monte_carlo(VirtualEngine(misfire_probability=misfires), [start], [5], cycles=120)
         ends.append(float(np.ravel(run["final_soc_cad"].values)[0]))
     assert ends[0] == ends[1]

@@ -42,7 +42,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
-    seeking = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+    seeking = {"start": -20.0, "bounds": (-30.0, 10.0)}
     return {
         "engine preset": lambda: presets.load("puma_single"),
         "throttle preset": lambda: presets.load("P1"),

@@ -34,7 +34,7 @@ def batch(make: Callable[[], Call]) -> Callable[[], Call]:
 
 
 def seeker() -> ExtremumSeeking:
-    return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    return ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 
 
 def pseudo_wiener() -> Any:

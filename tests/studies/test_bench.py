@@ -30,7 +30,7 @@ def four_tests(quick_study: Callable[..., StudyResult]) -> StudyResult:
 
 
 def test_without_figures_and_with_seeds() -> None:
-    result = run_study("nox-sensors", seeds=1, figures=False)
+    result = run_study("nox-sensors", n_seeds=1, figures=False)
     assert result.figures == {}
     assert result.summary["seeds"] == 1
     assert result.summary["rows"][0]["steady_error_percent_low"] is None  # one seed says nothing of its spread

@@ -75,7 +75,7 @@ def test_ctrl_c_in_the_first_part_of_a_later_group_keeps_the_earlier_ones() -> N
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="7 finished rows") as stop:
-        run_sensor_delay(seeds=1, quick=True, figures=False, progress=press)
+        run_sensor_delay(n_seeds=1, quick=True, figures=False, progress=press)
     part = stop.value.partial
     assert len(part.summary["rows"]) == 7
     assert part.summary["component_wise"] == []
@@ -84,5 +84,5 @@ def test_ctrl_c_in_the_first_part_of_a_later_group_keeps_the_earlier_ones() -> N
 def test_bad_requests_are_named() -> None:
     with pytest.raises(ParameterError, match=r"study = 'nothing': must be one of .*sensor-delay"):
         run_study("nothing")
-    with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes seeds"):
+    with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes n_seeds"):
         run_study("sensor-delay", traces=[])

@@ -167,7 +167,11 @@ def test_accuracy_few_seeds(accuracy: StudyResult) -> None:
 def test_trouble_few_seeds(accuracy: StudyResult) -> None:
     rows = {row["trouble"]: row for row in accuracy.summary["trouble"]}
     assert list(rows) == [case.name for case in HARD]
-    for name in ("J late, delay known", "J late, delay given 4 short", "J late, delay given 4 long"):
+    for name in (
+        "efficiency late, delay known",
+        "efficiency late, delay given 4 short",
+        "efficiency late, delay given 4 long",
+    ):
         assert rows[name]["median_first"] <= 45.0
     assert all((row["median_back"] is not None) == name.startswith("jump") for name, row in rows.items())
 

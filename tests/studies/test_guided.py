@@ -58,7 +58,7 @@ def test_losses_are_those_of_the_applied_timings(bench: StudyResult) -> None:
 
 @pytest.fixture(scope="module")
 def real() -> StudyResult:
-    return run_study("guided", seeds=12, real=True)
+    return run_study("guided", n_seeds=12, real=True)
 
 
 @pytest.mark.slow
@@ -130,7 +130,7 @@ def test_a_row_under_a_limit_by_hand() -> None:
 def test_records_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MGDD_DATA_DIR", raising=False)
     with pytest.raises(DataError, match="study guided needs the records"):
-        run_study("guided", seeds=1, real=True)
+        run_study("guided", n_seeds=1, real=True)
 
 
 def test_the_option_belongs_to_this_study(capsys: pytest.CaptureFixture[str]) -> None:

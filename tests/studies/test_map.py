@@ -156,7 +156,7 @@ def test_ctrl_c_keeps_the_finished_ways(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(from_design_to_map, "make_map", interrupted)
     with pytest.raises(Interrupted) as stopped:
-        run_study("from-design-to-map", seeds=1, quick=True)
+        run_study("from-design-to-map", n_seeds=1, quick=True)
     kept = stopped.value.partial.summary
     assert [row["way"] for row in kept["rows"]] == ["sweep in every cell", "polynomial of degree 3"]
     assert kept["other_engines"] == []

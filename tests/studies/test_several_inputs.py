@@ -48,7 +48,7 @@ def test_bars_are_those_of_the_rows(result: StudyResult) -> None:
     lost = {(row["map"], row["seeker"]): row["j_lost"] for row in result.summary["rows"]}
     bars = {bar["bar"]: bar for bar in result.summary["bars"]}
     assert len(bars) == 10
-    useless = bars["guide of no use: J lost over that without a guide [-]"]
+    useless = bars["guide of no use: loss over that without a guide [-]"]
     assert useless["worst"] == max(lost[name, USELESS] / lost[name, GP] for name in dict.fromkeys(at for at, _ in lost))
     assert (useless["met"], useless["cases"]) == (False, 4)
     bench = bars["bench: cycles truly above a limit [%]"]
@@ -149,7 +149,7 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="2 finished rows") as stop:
-        run_seekers_several_inputs(seeds=1, quick=True, progress=press)
+        run_seekers_several_inputs(n_seeds=1, quick=True, progress=press)
     part = stop.value.partial
     assert [row["seeker"] for row in part.summary["rows"]] == [GP, BENT]
     assert part.summary["bench"] == []

@@ -51,7 +51,7 @@ def test_rms_and_bands() -> None:
     assert rms([3.0, 4.0]) == pytest.approx(math.sqrt(12.5))
 
     def make(seed: int) -> tuple[VirtualEngine, ExtremumSeeking]:
-        return VirtualEngine(seed=seed), ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+        return VirtualEngine(seed=seed), ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 
     found = estimates(make, range(11), 120)
     variables = band_variables("x_{}_cad", ("run", "cycle"), [found], "°CA", with_quantiles("x"))
@@ -66,7 +66,7 @@ def test_rms_and_bands() -> None:
 @pytest.mark.parametrize("form", ["batch", "moving_average"])
 def test_slope_belongs_to_the_same_trajectory(form: str) -> None:
     def seeker() -> ExtremumSeeking:
-        return ExtremumSeeking(start=-15.0, lower=-30.0, upper=10.0, form=form, hold_cycles=400)
+        return ExtremumSeeking(start=-15.0, bounds=(-30.0, 10.0), form=form, hold_cycles=400)
 
     quiet = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
     bench, mine = VirtualEngine(**quiet), seeker()
@@ -80,7 +80,7 @@ def test_slope_belongs_to_the_same_trajectory(form: str) -> None:
 
 
 def test_loops_are_those_of_the_monte_carlo_over_seeds_alone() -> None:
-    seeker = Spsa(start=-12.0, lower=-30.0, upper=10.0)
+    seeker = Spsa(start=-12.0, bounds=(-30.0, 10.0))
     table = loops(VirtualEngine(), seeker, range(3), cycles=50)
     assert dict(table.sizes) == {"seed": 3}
     whole = monte_carlo(VirtualEngine(), seeker, range(3), cycles=50)

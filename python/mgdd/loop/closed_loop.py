@@ -72,7 +72,7 @@ def run_seeker(
     --------
     >>> from mgdd.loop import VirtualEngine, LoopCriteria, run_seeker
     >>> from mgdd.optimize import ExtremumSeeking
-    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    >>> seeker = ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0))
     >>> run = run_seeker(VirtualEngine(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
     >>> run.summary["cycles_to"] < 400
     True

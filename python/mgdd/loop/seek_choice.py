@@ -34,7 +34,7 @@ _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wid
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
 _PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later
 _OWN_WORDS = (
-    "start", "lower", "upper", "inputs", "limits", "maximize", "seed", "components", "delay_cycles", "lag_cycles",
+    "start", "bounds", "inputs", "limits", "maximize", "seed", "components", "delay_cycles", "lag_cycles",
     "guide", "curve", "limit_curves", "limit_guides",
 )  # fmt: skip
 _PERIODS = 64  # of a dither: 16 time constants of four periods
@@ -72,6 +72,7 @@ class Question:
     seed: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
     point: OperatingPoint | None = None
+    own_model: bool = False  # the guide is what the plant itself is made of
 
     @property
     def late_cycles(self) -> float:

@@ -286,7 +286,7 @@ def encoded(value: Any) -> Any:
         return {"surface": [value.axes, value.values.ravel().tolist()]}
     if isinstance(value, dict):
         return {name: encoded(item) for name, item in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [encoded(item) for item in value]
     return value
 

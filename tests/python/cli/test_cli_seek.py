@@ -375,7 +375,7 @@ def test_a_run_that_has_not_settled_writes_nothing(
 
 def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None:
     bench, timing = VirtualEngine(seed=2), TimingMap(CalibrationMap.load(table))
-    seeker = FeedForward(ExtremumSeeking(start=-9.0, lower=-30.0, upper=10.0), timing)
+    seeker = FeedForward(ExtremumSeeking(start=-9.0, bounds=(-30.0, 10.0)), timing)
     seeker.at(bench.point)
     run_seeker(bench, seeker, 900)
     args = Namespace(guide_map=str(table), guide_map_out=str(tmp_path / "out.nc"), seed=2)

@@ -40,7 +40,7 @@ def test_it_follows_an_engine_that_seeks_its_best_timing(method: str) -> None:
     bench = VirtualEngine(seed=3)
     alone = method == "extremum_seeking"  # then the timing must be measured: nothing else is fitted
     calibration = OnlineCalibration(WRONG, method=method, uncertainty=SURE if alone else ENGINE)
-    seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    seeker = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
     for _ in range(120):
         (soc_cad,) = seeker.ask()
         cycle = bench.step(soc_cad)
@@ -151,14 +151,14 @@ def test_a_refused_cycle_says_why() -> None:
         ({"window_cycles": 1}, "window_cycles = 1 cycles"),
         ({"method": "extremum_seeking", "parameters": ("tdc_offset_cad",)}, "wall_heat_scale alone"),
         ({"forgetting": 2.0}, "forgetting = 2"),
-        ({"engine": Cylinder(compression_ratio=1.5)}, "compression_ratio = 1.5"),
-        ({"engine": Cylinder(wall_temperature_k=200.0)}, "wall_temperature_k = 200"),
+        ({"cylinder": Cylinder(compression_ratio=1.5)}, "compression_ratio = 1.5"),
+        ({"cylinder": Cylinder(wall_temperature_k=200.0)}, "wall_temperature_k = 200"),
         ({"parameters": ("soc_variance_scale",), "soc_scatter_cad": 0.0}, "soc_scatter_cad = 0: must be above 0"),
     ],
 )
 def test_settings_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        OnlineCalibration(**{"engine": "puma_single", **arguments})
+        OnlineCalibration(**{"cylinder": "puma_single", **arguments})
 
 
 POINTS = [OperatingPoint(speed_rpm=n, fuel_mg=m) for n, m in ((1000.0, 8.0), (1500.0, 20.0), (2600.0, 35.0))]

@@ -109,7 +109,7 @@ def test_findings_of_the_search_know_their_names() -> None:
     def twins(x):
         return [x[0] + x[1] - 1.0, 2.0 * (x[0] + x[1]), x[2]], [[1, 1, 0], [2, 2, 0], [0, 0, 1]]
 
-    report = least_squares(twins, [0.1, 0.2, 0.5], names=["a", "b", "c"], lower=[-9, -9, 0.1])
+    report = least_squares(twins, [0.1, 0.2, 0.5], names=["a", "b", "c"], bounds=([-9, -9, 0.1], np.inf))
     found = {finding.code: finding for finding in report.findings}
     assert set(found["null_direction"].names) == {"a", "b"}
     assert found["at_bound"].names == ("c",)

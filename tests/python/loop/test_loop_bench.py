@@ -148,7 +148,7 @@ def test_settings_build_the_same_bench_again() -> None:
         ({"nox_sensor": "nose"}, "nox_sensor = 'nose': must be one of none, analyser"),
         ({"nox_sensor": "none", "performance": Performance.efficiency_and_nox()}, "nox_sensor = 'none'"),
         ({"integrator": "magic"}, "integrator = 'magic'"),
-        ({"engine": "no_such_preset"}, "no preset 'no_such_preset'"),
+        ({"cylinder": "no_such_preset"}, "no preset 'no_such_preset'"),
         ({"point": OperatingPoint(fuel_mg=0.0)}, r"schedule\[0\].fuel_mg = 0 mg: must be > 0"),
     ],
 )

@@ -74,7 +74,7 @@ def ode(time: Any, u: Any, start: Any) -> Any:
 
 
 def indicating(angle: Any) -> Indicating:
-    return Indicating(angle, Cylinder(), speed_rpm=6000.0)
+    return Indicating(Cylinder(), angle, speed_rpm=6000.0)
 
 
 def run(model: Any) -> Call:
@@ -109,7 +109,7 @@ def line(x: Array) -> tuple[Array, Array]:
 
 
 def searched(x0: Any, lower: Any, upper: Any, data: Any) -> Any:
-    return optimize.least_squares(line, x0, lower=lower, upper=upper, data=data).values
+    return optimize.least_squares(line, x0, bounds=(lower, upper), data=data).values
 
 
 def logged(*columns: Any) -> Any:
@@ -143,7 +143,7 @@ def calibrated(trace: Any) -> Any:
 def guided(trace: Any) -> Any:
     rough, point = Cylinder(wall_heat_scale=1.0), OperatingPoint()
     calibration = guide.OnlineCalibration(rough, window_cycles=2, steady_cycles=0)
-    seeker = optimize.ExtremumSeeking(start=-6.0, lower=-30.0, upper=10.0)
+    seeker = optimize.ExtremumSeeking(start=-6.0, bounds=(-30.0, 10.0))
     engine = guide.GuidedEngine(seeker, guide.ModelOptimum(rough), point, calibration=calibration)
     for _ in range(3):
         engine.ask()
@@ -189,7 +189,7 @@ def exchanged(row: Any) -> Any:
 
 
 def whole_cycle(pressure: Any) -> xr.Dataset:
-    return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0).noise(pressure)
+    return Indicating(Cylinder(), np.arange(-360.0, 360.0), speed_rpm=6000.0).noise(pressure)
 
 
 def queued(references: Any) -> Any:

@@ -89,7 +89,7 @@ def _log(path: Path) -> None:
 
 def _seeker(path: Path) -> None:
     limit = Limit(name="p_max_bar", upper=110.0)
-    seeker = GradientDescent(start=-6.0, lower=-20.0, upper=10.0, limits=[limit])
+    seeker = GradientDescent(start=-6.0, bounds=(-20.0, 10.0), limits=[limit])
     for _ in range(5):
         u = float(seeker.ask()[0])
         seeker.tell(0.0 - 0.01 * u * u, limits={"p_max_bar": 90.0 - u})
