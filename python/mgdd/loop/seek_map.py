@@ -166,7 +166,7 @@ def seek_map(
     if seeker is None:
         own = dict(settings or {})
         if isinstance(driven, VirtualTestBed) and _is_engine(guide):
-            cylinder = cylinder_of(getattr(guide, "cylinder", guide), "guide")
+            cylinder = cylinder_of(getattr(guide, "cylinder", guide))
             guide, limit_guides = model_of(driven, cylinder, entries, sought, [limit.name for limit in sides])
         own.setdefault("averaged", float(dwell.most))
         own.setdefault("moving_cost", dwell.settling / max(dwell.most, 1))
@@ -229,7 +229,7 @@ def model_of(
     nodes = {name: np.asarray(entries, np.float64) for name, entries in axes.items()}
     nodes |= {one.name: np.linspace(one.lower, one.upper, _NODES.get(len(inputs), 7)) for one in inputs}
     grid = dict(zip(nodes, np.meshgrid(*nodes.values(), indexing="ij"), strict=True))
-    found = bed.with_engine(cylinder).steady(grid)
+    found = bed.with_cylinder(cylinder).steady(grid)
     shape = tuple(column.size for column in nodes.values())
 
     def over_all(name: str) -> xr.DataArray:
