@@ -44,11 +44,11 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
     if (held != at[own]) on[i].slope.fill(0.0);
   }
   // The nodes around, then without their last axis, and so on: what is left of the value and of every slope.
-  constexpr std::size_t around = 1024;
+  constexpr Eigen::Index around = 1024;
   static_assert(most_inputs == 5);  // of four nodes each
-  std::array<double, around> value;
-  std::array<std::array<double, around / 4>, most_inputs> slope;
-  std::size_t left = 0;
+  Eigen::Array<double, around, 1> value;
+  Eigen::Array<double, around / 4, most_inputs> slope;  // a column per axis
+  Eigen::Index left = 0;
   for (bool more = true; more; ++left) {
     std::size_t node = 0;
     for (std::size_t i = 0; i < n; ++i)
@@ -59,25 +59,26 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
       step[--axis] = 0;
     more = axis > 0;
   }
-  for (std::size_t i = n; i-- > 0;) {
-    const CubicWeights& own = on[i];
-    left /= own.count;
-    const auto contract = [&](const double* from, const auto& weights) {
+  const auto axes = static_cast<Eigen::Index>(n);
+  for (Eigen::Index i = axes; i-- > 0;) {
+    const CubicWeights& own = on[static_cast<std::size_t>(i)];
+    const auto count = static_cast<Eigen::Index>(own.count);
+    left /= count;
+    const auto contract = [&](const double* from, const std::array<double, 4>& weights) {
       double sum = 0.0;
       for (std::size_t k = 0; k < own.count; ++k)
         sum += weights[k] * from[k];
       return sum;
     };
-    for (std::size_t p = 0; p < left; ++p) {
-      const std::size_t from = p * own.count;
-      slope[i][p] = contract(&value[from], own.slope);
-      for (std::size_t k = i + 1; k < n; ++k)
-        slope[k][p] = contract(&slope[k][from], own.value);
+    for (Eigen::Index p = 0; p < left; ++p) {
+      const Eigen::Index from = p * count;
+      slope(p, i) = contract(&value[from], own.slope);
+      for (Eigen::Index k = i + 1; k < axes; ++k)
+        slope(p, k) = contract(&slope(from, k), own.value);
       value[p] = contract(&value[from], own.value);
     }
   }
-  for (std::size_t i = 0; i < n; ++i)
-    slopes[static_cast<Eigen::Index>(i)] = slope[i][0];
+  slopes = slope.row(0).head(axes).matrix().transpose();
   return value[0];
 }
 
