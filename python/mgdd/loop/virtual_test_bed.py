@@ -122,7 +122,12 @@ class VirtualTestBed:
         return dataclasses.replace(measured, applied={**at, **measured.applied})
 
     def steady(self, columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
-        """Give J and limits without noise, each sensor settled, at columns of all inputs, broadcast together; NaN where none has a cycle.
+        """Give J and limits without noise, each sensor settled, at columns of all inputs; NaN where there is no cycle.
+
+        Parameters
+        ----------
+        columns : mapping of str to array_like
+            All of `input_names`, broadcast together.
 
         Returns
         -------
