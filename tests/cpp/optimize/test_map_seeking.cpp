@@ -179,7 +179,8 @@ TEST(MapSeeking, KeepsOutOfACellThatFails) {
     const bool fails = visit.context[0] > 3.5 && visit.context[1] < 0.4;
     failed += fails ? 1 : 0;
     if (fails) {
-      EXPECT_EQ(search.tell(visit.context, visit.input, {.misfire = true}), TellStatus::misfire);
+      EXPECT_EQ(search.tell(visit.context, visit.input, Reading{.components = {}, .limits = {}, .misfire = true}),
+                TellStatus::misfire);
     } else {
       read(search, plant, visit.context, visit.input, k);
     }
@@ -198,7 +199,8 @@ TEST(MapSeeking, RefusesWhatIsNoReadingAndChangesNothing) {
             TellStatus::not_a_reading);
   EXPECT_EQ(search.tell(point(2, 0.5), scalar_input(9), {.components = {&torque, 1}, .limits = bad}),
             TellStatus::not_a_reading);
-  EXPECT_EQ(search.tell(point(2, 0.5), scalar_input(9), {.components = {&torque, 1}}), TellStatus::wrong_limit_count);
+  EXPECT_EQ(search.tell(point(2, 0.5), scalar_input(9), Reading{.components = {&torque, 1}, .limits = {}}),
+            TellStatus::wrong_limit_count);
   EXPECT_EQ(save_state(search), before);
 }
 
