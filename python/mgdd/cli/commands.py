@@ -112,8 +112,8 @@ COMMANDS = {
         "--controller pid --preset P2 --budget 60 --throttles 8 --json", "throttle_track"),
     "rig": Command("experiments in process, over a CAN bus and on a bench"),
     "rig run": Command(
-        "run an experiment: identify or track on a throttle, seek on an engine; in process, over a bus, on a record or "
-        "on a bench", "track.toml --mode hil --folder runs/first", "rig_run"),
+        "run an experiment: identify or track on a throttle, seek or map on an engine; in process, over a bus, on a "
+        "record or on a bench", "track.toml --mode hil --folder runs/first", "rig_run"),
     "rig check": Command(
         "check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
         "track.toml --mode bench --connection socketcan:can0 --pace real_time --json", "rig_run"),

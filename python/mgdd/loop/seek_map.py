@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.engine import Cylinder
-from mgdd.errors import DataError, Interrupted, ParameterError, argument
+from mgdd.errors import DataError, Interrupted, ParameterError, argument, hinted
 from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.lower_limits import both_sides, measured_names, plain_name, with_lower_sides
 from mgdd.loop.map_result import MapSearch, Visit
@@ -33,6 +33,9 @@ _FEWEST = 10  # cycles that tell what a mean is worth
 _KNOWN = 0.5  # of what is not known at a visit: a mean that is surer teaches little more
 _FAILED = 0.5  # share of the cycles of a visit
 _ELSEWHERE = 0.01  # of an axis: a cycle that ran farther from its operating point is none of the visit
+_SETTINGS = (
+    "noise_sd", "averaged", "moving_cost", "memory_readings", "horizon", "kept", "reach", "limit_probability",
+)  # fmt: skip
 _NODES = {1: 41, 2: 17, 3: 11}
 _SURE_FROM = 3  # visits per axis and input: what fewer promise of the regret is too much
 
@@ -155,10 +158,7 @@ def seek_map(
     >>> found.findings
     ()
     """
-    if isinstance(visits, bool) or not isinstance(visits, int | np.integer) or visits < 1:
-        raise ParameterError.of("visits", visits, "a whole number >= 1")
-    if tolerance is not None and not tolerance > 0.0:
-        raise ParameterError.of("tolerance", tolerance, "> 0, in the unit of J")
+    require_end(visits, tolerance)
     sides = both_sides(limits) if seeker is None else tuple(seeker.settings["limits"])
     sought = seek_inputs(inputs) if seeker is None else tuple(seeker.settings["inputs"])
     entries = entries_of(axes, [one.name for one in sought]) if seeker is None else seeker.axes
@@ -174,8 +174,8 @@ def seek_map(
             cylinder = cylinder_of(getattr(guide, "cylinder", guide), "guide")
             guide, limit_guides = model_of(driven, cylinder, entries, sought, [limit.name for limit in sides])
         seeker = map_seeker(
-            inputs, entries, dwell, limits=sides, guide=guide, limit_guides=limit_guides, start=started(start, sought),
-            maximize=maximize, seed=seed, **(settings or {}),
+            inputs, entries, dwell, settings or {}, limits=sides, guide=guide, limit_guides=limit_guides,
+            start=started(start, sought), maximize=maximize, seed=seed,
         )  # fmt: skip
     return _searched(with_lower_sides(driven, sides), seeker, dwell, visits, tolerance, record, on_visit)
 
@@ -185,6 +185,14 @@ def _is_engine(guide: Any) -> bool:
     return isinstance(guide, str | os.PathLike | Preset | EngineGuide) or isinstance(
         getattr(guide, "model", guide), Cylinder
     )
+
+
+def require_end(visits: int, tolerance: float | None) -> None:
+    """ParameterError for what ends no search."""
+    if isinstance(visits, bool) or not isinstance(visits, int | np.integer) or visits < 1:
+        raise ParameterError.of("visits", visits, "a whole number >= 1")
+    if tolerance is not None and not tolerance > 0.0:
+        raise ParameterError.of("tolerance", tolerance, "> 0, in the unit of J")
 
 
 class Dwell(NamedTuple):
@@ -206,10 +214,22 @@ def dwell_of(averaged: Any, settling: int | None, *, on_plant: bool) -> Dwell:
     return Dwell(int(before), int(least), int(most))
 
 
-def map_seeker(inputs: Any, axes: Mapping[str, ArrayLike], dwell: Dwell, **settings: Any) -> MapSeeking:
-    """Make the seeker of visits of that length."""
+def map_seeker(
+    inputs: Any, axes: Mapping[str, ArrayLike], dwell: Dwell, settings: Mapping[str, Any], **given: Any
+) -> MapSeeking:
+    """Make the seeker of visits of that length, with further settings; ParameterError that names one as such."""
+    for name in settings:
+        if name not in _SETTINGS:
+            raise ParameterError(
+                hinted(f"{argument('settings')}: {name!r}: must be one of {', '.join(_SETTINGS)}", name, _SETTINGS)
+            )
     own = {"averaged": float(dwell.most), "moving_cost": dwell.settling / dwell.most}
-    return MapSeeking(inputs, axes, **{**own, **settings})
+    try:
+        return MapSeeking(inputs, axes, **given, **{**own, **settings})
+    except ParameterError as error:
+        if error.field not in settings:
+            raise
+        raise error.reworded(f"{argument('settings')}: {error}") from error
 
 
 def _as_inputs(axes: Mapping[str, ArrayLike]) -> list[Input]:

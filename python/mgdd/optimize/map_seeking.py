@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from mgdd.optimize import Input
+    from mgdd._core.optimize import Input
 
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7}  # of a guide, per input
 _REFUSED = ("J is not one number", "wrong number of limits", "a number that is not a reading: finite, within 1e30")

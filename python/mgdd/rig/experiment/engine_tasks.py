@@ -21,7 +21,7 @@ from mgdd.loop.lower_limits import both_sides, measured_names
 from mgdd.loop.map_result import MapSearch
 from mgdd.loop.seek import require_cycles, searched, seek_inputs, started, tell_known
 from mgdd.loop.seek_choice import Choice, Question, chosen
-from mgdd.loop.seek_map import Progress, dwell_of, map_seeker, model_of
+from mgdd.loop.seek_map import Progress, dwell_of, map_seeker, model_of, require_end
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize.map_seeking import entries_of
 from mgdd.plot.style import drawn
@@ -119,10 +119,11 @@ class MapPlan:
                                  inputs=list(task.inputs))  # fmt: skip
             bed.require_cells(entries)
             guide = model_of(bed, cylinder, entries, inputs, [limit.name for limit in sides])
+        require_end(task.visits, task.tolerance)
         dwell = dwell_of(task.averaged, task.settling, on_plant=True)
         self._made = partial(
-            map_seeker, task.inputs, entries, dwell, limits=sides, guide=guide[0], limit_guides=guide[1],
-            start=started(task.start or None, inputs), seed=seed, **task.settings,
+            map_seeker, task.inputs, entries, dwell, task.settings, limits=sides, guide=guide[0],
+            limit_guides=guide[1], start=started(task.start or None, inputs), seed=seed,
         )  # fmt: skip
         first = self._made().suggest()
         self.start = {**first.at, **first.inputs}
