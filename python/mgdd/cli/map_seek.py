@@ -89,6 +89,8 @@ def _seek(args: argparse.Namespace) -> None:
             if not isinstance(stop.partial, MapSearch):
                 raise
             found, interrupted = stop.partial, True
+            if not found.visits:
+                raise Stopped("no visit was finished, so there is no map") from stop
     warn(*found.findings)
     maps = list(found.maps.values())
     payload = found.to_dict() | {"interrupted": interrupted, "preset": preset, "sensor": args.sensor}
