@@ -42,7 +42,7 @@ def guided(*, calibrated: bool = True, recalibrated_cad: float = 0.1) -> GuidedE
     curve = model.curve(bench().point)
     if curve is None:
         sys.exit("the guide has no curve: nothing timed")
-    seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
+    seeker = CurveSeeking(start=curve.best, bounds=(-30.0, 10.0), curve=curve)
     calibration = OnlineCalibration(WRONG, window_cycles=WINDOW, steady_cycles=0) if calibrated else None
     return GuidedEngine(seeker, model, bench().point, calibration=calibration, recalibrated_cad=recalibrated_cad)
 

@@ -32,13 +32,13 @@ from mgdd_studies.several_maps import SeekingMap
 
 
 def golden(field: SeekingMap, start: float, seed: int) -> optimize.Seeker:  # noqa: ARG001 - no chance in it
-    return optimize.GoldenSection(start=start, lower=field.lower, upper=field.upper, noise_sd=field.noise_sd)
+    return optimize.GoldenSection(start=start, bounds=(field.lower, field.upper), noise_sd=field.noise_sd)
 
 
 def curve(name: str) -> Callable[[SeekingMap], Contender]:
     def make(field: SeekingMap, start: float, seed: int) -> optimize.Seeker:  # noqa: ARG001 - no chance in it
         return guide.CurveSeeking(
-            start=start, lower=field.lower, upper=field.upper, curve=field.guides[name], prior_sd=field.prior_sd
+            start=start, bounds=(field.lower, field.upper), curve=field.guides[name], prior_sd=field.prior_sd
         )
 
     return driven(make)

@@ -60,7 +60,7 @@ def arguments() -> argparse.Namespace:
 
 
 def loop_seeker() -> optimize.ExtremumSeeking:
-    return optimize.ExtremumSeeking(start=START, lower=LOWER, upper=UPPER)
+    return optimize.ExtremumSeeking(start=START, bounds=(LOWER, UPPER))
 
 
 def drive_from_python(bench: VirtualEngine, seeker: optimize.ExtremumSeeking, cycles: int) -> None:
@@ -119,7 +119,7 @@ def function_plants() -> dict[str, FunctionPlant]:
 
 
 def seekers() -> dict[str, Callable[[], object]]:
-    bounds = {"start": 0.0, "lower": LOWER, "upper": UPPER}
+    bounds = {"start": 0.0, "bounds": (LOWER, UPPER)}
     return {
         "ExtremumSeeking": lambda: optimize.ExtremumSeeking(**bounds),
         "Spsa": lambda: optimize.Spsa(**bounds),

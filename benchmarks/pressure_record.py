@@ -101,7 +101,7 @@ def main() -> None:
             "NumPy, three indicators, window given": lambda: by_numpy(angle, pressure, cylinder),
         }
         four = np.resize(pressure, (4, MANY // 4, angle.size)) * np.linspace(0.98, 1.02, 4)[:, None, None]
-        tool = Indicating(angle, cylinder, speed_rpm=1500.0, heat_window_cad=WINDOW)
+        tool = Indicating(cylinder, angle, speed_rpm=1500.0, heat_window_cad=WINDOW)
         fast, rows = tool.record(four, threads=1), by_numpy(angle, four.reshape(MANY, -1), cylinder)
         for name in ("imep_closed_bar", "ca50_cad"):
             np.testing.assert_allclose(fast[name].to_numpy().ravel(), rows[name], rtol=1e-9)

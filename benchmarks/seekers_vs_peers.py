@@ -122,9 +122,7 @@ def golden(*, noise_known: bool) -> Contender:
     def run(plant: Plant, start: float, seed: int) -> None:
         sigma = measured(plant, start).noise_sd if noise_known else 0.0
         middle = start + np.random.default_rng([seed, 1]).uniform(-SHIFT, SHIFT)
-        drive(
-            optimize.GoldenSection(start=start, lower=middle - BRACKET, upper=middle + BRACKET, noise_sd=sigma), plant
-        )
+        drive(optimize.GoldenSection(start=start, bounds=(middle - BRACKET, middle + BRACKET), noise_sd=sigma), plant)
 
     return run
 

@@ -56,8 +56,7 @@ def ours(scenario: Scenario) -> list[Row]:
         moves = scenario.drift or scenario.jump or scenario.level_drift
         return GaussianProcessSeeking(
             start=start,
-            lower=field.lower,
-            upper=field.upper,
+            bounds=(field.lower, field.upper),
             delay_cycles=scenario.told_delay(seed),
             lag_cycles=scenario.lag,
             **({"memory_cycles": MEMORY} if moves else {}),

@@ -54,9 +54,7 @@ def at_rest(field: SeekingMap) -> Contender:  # noqa: ARG001 - it does nothing a
 
 def guided(guide: Callable[[SeekingMap, int], Guide]) -> OnMap:
     def make(field: SeekingMap, start: Point, seed: int) -> optimize.Seeker:
-        return optimize.GaussianProcessSeeking(
-            start=start, lower=field.lower, upper=field.upper, guide=guide(field, seed)
-        )
+        return optimize.GaussianProcessSeeking(start=start, bounds=(field.lower, field.upper), guide=guide(field, seed))
 
     return driven(make)
 

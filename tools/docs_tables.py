@@ -92,9 +92,9 @@ def online_calibration() -> Rows:
         ("TDC read 0.5 °CA late", {"tdc_error_cad": 0.5}, 0.0),
         ("pressure 1 % high", {"pressure_gain_error": 0.01}, 0.0),
         ("pegging 0.1 bar high", {"pressure_offset_bar": 0.1}, 0.0),
-        ("compression ratio 0.1 higher", {"engine": Cylinder(compression_ratio=18.3)}, 0.0),
+        ("compression ratio 0.1 higher", {"cylinder": Cylinder(compression_ratio=18.3)}, 0.0),
         ("intake 10 K warmer", {"point": OperatingPoint(intake_temperature_k=323.0)}, 0.0),
-        ("walls 70 K hotter", {"engine": Cylinder(wall_temperature_k=520.0)}, 0.0),
+        ("walls 70 K hotter", {"cylinder": Cylinder(wall_temperature_k=520.0)}, 0.0),
     ):
         row: list[float] = []
         for method, uncertainty in (("gauss_newton", alone), ("gauss_newton", None), ("recursive", None)):
@@ -138,8 +138,8 @@ def guided_bench() -> Rows:
 
 
 def guided_start() -> Rows:
-    names = ("cycles_to_1_cad", "lost_j_cycles", "late_loss")
-    return {row["case"]: [float(row[name]) for name in names] for row in study("guided")["rows"]}
+    rows = [row for row in study("guided")["rows"] if row["case"] != "feed_forward"]
+    return {row["case"]: [float(row["cycles_to_1_cad"]), float(row["lost_j_cycles"])] for row in rows}
 
 
 def learning() -> Rows:

@@ -28,8 +28,9 @@ def executed(path: Path, folder: Path) -> Any:
     notebook = nbformat.read(path, as_version=4)
     resources = {"metadata": {"path": str(folder)}}
     client = nbclient.NotebookClient(
-        notebook, timeout=300, iopub_timeout=120, kernel_name="python3", record_timing=False, resources=resources
-    )
+        notebook, timeout=300, iopub_timeout=120, kernel_name="python3", record_timing=False, resources=resources,
+        coalesce_streams=True,
+    )  # fmt: skip
     client.execute(env={**os.environ, "MPLBACKEND": "module://matplotlib_inline.backend_inline"})
     return notebook
 

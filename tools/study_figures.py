@@ -23,6 +23,7 @@ FIGURES = {
     "study_delay.png": ("sensor-delay", 0, 90),
     "study_cures.png": ("sensor-delay", 1, 90),
     "study_tests.png": ("timing-tests", 3, 80),
+    "study_guided.png": ("guided", 0, 80),
     "study_guide_curve.png": ("guided-start-up", 1, 72),
     "study_guide_step.png": ("guide-accuracy", 0, 72),
     "study_ignition_delay.png": ("ignition-delay", 0, 80),

@@ -52,7 +52,7 @@ def driven(make: Make, *, asks_again: bool = False) -> OnMap:
 def untouched(kind: Callable[..., optimize.Seeker], **settings: object) -> OnMap:
     def make(field: SeekingMap, start: Point, seed: int) -> optimize.Seeker:
         chance = {"seed": seed} if kind is optimize.Spsa else {}
-        return kind(start=start, lower=field.lower, upper=field.upper, **settings, **chance)
+        return kind(start=start, bounds=(field.lower, field.upper), **settings, **chance)
 
     return driven(make)
 

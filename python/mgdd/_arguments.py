@@ -6,15 +6,13 @@ The core calls `refusal` where pybind11 would list its signatures. No public par
 from __future__ import annotations
 
 import ast
+import inspect
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd.errors import Error, ParameterError, did_you_mean, shortened
-
-if TYPE_CHECKING:
-    import inspect
 
 _NUMBERS, _NUMBER, _WHOLE = "ArrayLike", "SupportsFloat", "SupportsInt"
 _NAMED = {

@@ -22,14 +22,19 @@ def takes_settings_of(core: Any, *, without: tuple[str, ...] = ()) -> Callable[[
         named = [each for each in parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
         fields = {name: each for name, each in core.fields().items() if name not in parameters and name not in without}
         given = inspect.signature(core).parameters
-        cls.__init__.__signature__ = inspect.Signature([*named, *(given[name] for name in fields)])  # type: ignore[misc]
+        own = {name: given.get(name) or _keyword(name, each["default"]) for name, each in fields.items()}
+        cls.__init__.__signature__ = inspect.Signature([*named, *own.values()])  # type: ignore[misc]
         if cls.__doc__:
-            entries = "".join(line for name, each in fields.items() for line in _entry(name, each, given[name].default))
+            entries = "".join(line for name, each in fields.items() for line in _entry(name, each, own[name].default))
             # From 3.13 on a docstring comes without its indentation.
             cls.__doc__ = inspect.cleandoc(cls.__doc__).replace(_MARK, entries)
         return cls
 
     return decorate
+
+
+def _keyword(name: str, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default)
 
 
 def _entry(name: str, field: dict[str, Any], default: Any) -> Iterator[str]:

@@ -232,7 +232,7 @@ class Interrupted(KeyboardInterrupt):
     >>> from mgdd.errors import Interrupted
     >>> from mgdd.loop import VirtualEngine, run_seeker
     >>> from mgdd.optimize import GoldenSection
-    >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
+    >>> seeker = GoldenSection(start=-20.0, bounds=(-30.0, 10.0), noise_sd=0.25)
     >>> try:
     ...     run = run_seeker(VirtualEngine(), seeker, 300)
     ... except Interrupted as stop:

@@ -75,11 +75,11 @@ class StudyResult(Report):
         return f"study {self.name}"
 
 
-def check_seeds(seeds: int, *, quick: bool = False, most: int = 1) -> int:
+def check_seeds(n_seeds: int, *, quick: bool = False, most: int = 1) -> int:
     """Refuse a number of seeds that is none; a quick study takes `most` at the most."""
-    if seeds < 1:
-        raise ParameterError.of("seeds", seeds, ">= 1")
-    return min(seeds, most) if quick else seeds
+    if n_seeds < 1:
+        raise ParameterError.of("n_seeds", n_seeds, ">= 1")
+    return min(n_seeds, most) if quick else n_seeds
 
 
 @dataclass

@@ -40,7 +40,7 @@ _SHORT_CASES = [
 
 
 def run_calibrated_guide(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Seek with a guide of the wrong burn and wall heat, which the measured pressure calibrates or not.
 
@@ -53,7 +53,7 @@ def run_calibrated_guide(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of every case.
     quick : bool
         At most two seeds.
@@ -81,28 +81,28 @@ def run_calibrated_guide(
     Examples
     --------
     >>> from mgdd_studies.calibrated_guide import run_calibrated_guide
-    >>> rows = run_calibrated_guide(seeds=1, quick=True, figures=False).summary["rows"]
+    >>> rows = run_calibrated_guide(n_seeds=1, quick=True, figures=False).summary["rows"]
     >>> [round(rows[at]["guide_error_end_cad"], 0) for at in (0, 1)]  # Wiebe 45, not calibrated and calibrated
     [7.0, -1.0]
     """
-    seeds = check_seeds(seeds, quick=quick, most=2)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=2)
     work = Parts(progress)
     maps = {engine.name: SteadyMap.of(engine.bench()) for engine in _ENGINES}
-    runs = work((case.name, partial(_seek, case, maps, seeds)) for case in _MAIN_CASES)
+    runs = work((case.name, partial(_seek, case, maps, n_seeds)) for case in _MAIN_CASES)
     refits = work(
-        (f"refits, {engine.name}, {recipe.name}", partial(_refits, engine, recipe, maps, seeds))
+        (f"refits, {engine.name}, {recipe.name}", partial(_refits, engine, recipe, maps, n_seeds))
         for engine in _ENGINES for recipe in (cases.HEAT, cases.BURN)
     )  # fmt: skip
-    settings = work((case.name, partial(_seek, case, maps, seeds)) for case in _SHORT_CASES)
+    settings = work((case.name, partial(_seek, case, maps, n_seeds)) for case in _SHORT_CASES)
     steps = work(
-        (f"load step, {form}, {engine.name}, calibrated: {recipe.name}", partial(_step, engine, form, recipe, seeds))
+        (f"load step, {form}, {engine.name}, calibrated: {recipe.name}", partial(_step, engine, form, recipe, n_seeds))
         for engine in _ENGINES for form in ("curve", "feed-forward") for recipe in (*cases.RECIPES, cases.STEADY)
     )  # fmt: skip
     rows = [cases.row(own, cases.uncalibrated(own, runs)) for own in runs]
     step_rows = [cases.step_row(own, steps) for own in steps]
     return work.finish(
         "calibrated-guide", _dataset(runs, steps), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=rows,
         refits=refits,
         settings=[cases.setting_row(own, cases.uncalibrated(own, settings)) for own in settings],
@@ -113,10 +113,10 @@ def run_calibrated_guide(
     )  # fmt: skip
 
 
-def _seek(case: Case, maps: dict[str, SteadyMap], seeds: int) -> Runs:
+def _seek(case: Case, maps: dict[str, SteadyMap], n_seeds: int) -> Runs:
     """Run one case, once per seed."""
     steady = maps[case.engine.name]
-    benches = [case.engine.bench(seed, tdc_error_cad=case.tdc_error_cad) for seed in range(seeds)]
+    benches = [case.engine.bench(seed, tdc_error_cad=case.tdc_error_cad) for seed in range(n_seeds)]
     found = [cases.guided_run(bench, case.recipe, case.start_cad, case.cycles) for bench in benches]
     return Runs(case=case, best_cad=steady.best_cad, **_errors(found, steady))
 
@@ -129,15 +129,15 @@ def _errors(found: list[GuidedRun], steady: SteadyMap) -> dict[str, NDArray[np.f
     }
 
 
-def _refits(engine: Engine, recipe: Recipe, maps: dict[str, SteadyMap], seeds: int) -> dict[str, Any]:
-    found = [cases.refits_of(engine.bench(seed), recipe, _STARTS_CAD[0], REFIT_CYCLES) for seed in range(seeds)]
+def _refits(engine: Engine, recipe: Recipe, maps: dict[str, SteadyMap], n_seeds: int) -> dict[str, Any]:
+    found = [cases.refits_of(engine.bench(seed), recipe, _STARTS_CAD[0], REFIT_CYCLES) for seed in range(n_seeds)]
     return cases.refit_row(engine, recipe, found, maps[engine.name].best_cad)
 
 
-def _step(engine: Engine, form: str, recipe: Recipe, seeds: int) -> Steps:
+def _step(engine: Engine, form: str, recipe: Recipe, n_seeds: int) -> Steps:
     _, after = engine.step_maps()
     whole = [
-        cases.step_run(engine.stepping(seed, STEP_CYCLE), recipe, form, STEP_CYCLE + AFTER) for seed in range(seeds)
+        cases.step_run(engine.stepping(seed, STEP_CYCLE), recipe, form, STEP_CYCLE + AFTER) for seed in range(n_seeds)
     ]
     found = _errors([GuidedRun(*(column[STEP_CYCLE:] for column in run)) for run in whole], after)
     return Steps(
@@ -171,7 +171,7 @@ def _dataset(runs: list[Runs], steps: list[Steps]) -> xr.Dataset:
         variables |= {
             "step": ("step", names, "-", "engine, form and calibration"),
             "after_step": ("after_step", np.arange(AFTER), "-", "cycles since the load step"),
-            "step_lost": (("step", "seed"), [own.lost for own in steps], "%", "J lost after the load step"),
+            "step_lost": (("step", "seed"), [own.lost for own in steps], "%", "loss of efficiency after the load step"),
             **band_variables("step_error_{}_cad", ("step", "after_step"), bands, "°CA", with_quantiles(text)),
         }
     return labelled_dataset(variables)

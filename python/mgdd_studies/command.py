@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["fill", "rows_table", "run", "run_study"]
 
-_STUDY = Options(run_study, "seeds", "quick")
+_STUDY = Options(run_study, "quick", n_seeds="seeds")
 _LOW = "_low"
 _OPTIONS = {"real": ("guided",)}  # of single studies
 

@@ -119,7 +119,9 @@ class Truth:
             "speed_rpm": speed, "fuel_mg": fuel, "intake_pressure_kpa": intake_kpa(fuel),
             "soc_cad": np.tile(_FINE, places[0].size),
         }  # fmt: skip
-        found = sweep(cylinder, OperatingPoint(), inputs, points=True, outputs=["efficiency_gross", *LIMITS], workers=1)
+        found = sweep(
+            cylinder, OperatingPoint(), inputs, pointwise=True, outputs=["efficiency_gross", *LIMITS], workers=1
+        )
         raw = {name: found[name].to_numpy().reshape(-1, _FINE.size) for name in ("efficiency_gross", *LIMITS)}
         columns = {OBJECTIVE: 100.0 * raw["efficiency_gross"], **{name: raw[name] for name in LIMITS}}
         numbered = as_sweep(columns, _FINE, {"place": np.arange(float(places[0].size))})
@@ -189,7 +191,7 @@ def drive(cylinder: Cylinder, guide: Any, seed: int, *, learns: bool = False) ->
     schedule = [(k * DWELL, point) for k, point in enumerate(points)]
     bench = VirtualEngine(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed)
     plain = ExtremumSeeking(
-        start=_START_CAD, lower=_BOUNDS_CAD[0], upper=_BOUNDS_CAD[1], form="moving_average", gain=_GAIN,
+        start=_START_CAD, bounds=_BOUNDS_CAD, form="moving_average", gain=_GAIN,
         amplitude=1.0, limits=[Limit(name, upper) for name, upper in LIMITS.items()],
     )  # fmt: skip
     seeker = FeedForward(plain, guide)

@@ -64,7 +64,7 @@ def screen() -> FeasibleRegion:
 
     def indicators(columns: dict[str, Array]) -> dict[str, Array]:
         told = {**columns, "intake_pressure_kpa": intake_kpa(columns["fuel_mg"])}
-        found = sweep(ROUGH, OperatingPoint(), told, points=True, outputs=list(LIMITS), workers=1)
+        found = sweep(ROUGH, OperatingPoint(), told, pointwise=True, outputs=list(LIMITS), workers=1)
         return {name: found[name].to_numpy() for name in LIMITS}
 
     return FeasibleRegion.of_model(indicators, {name: _SCREEN * upper for name, upper in LIMITS.items()})

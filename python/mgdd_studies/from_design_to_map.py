@@ -206,7 +206,7 @@ _PARTED = (POLYNOMIAL, PROCESS)
 
 
 def run_from_design_to_map(
-    *, seeds: int = 30, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 30, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Calibrate a timing map the conventional way, judge it by the truth, and let the guide use it and teach it.
 
@@ -221,7 +221,7 @@ def run_from_design_to_map(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Repetitions of everything: design, noise, route.
     quick : bool
         At most two seeds, three ways and two engines.
@@ -252,22 +252,22 @@ def run_from_design_to_map(
     Examples
     --------
     >>> from mgdd_studies.from_design_to_map import run_from_design_to_map
-    >>> rows = run_from_design_to_map(seeds=1, quick=True, figures=False).summary["rows"]
+    >>> rows = run_from_design_to_map(n_seeds=1, quick=True, figures=False).summary["rows"]
     >>> [row["way"] for row in rows], all(row["worst_lost_percent"] < 0.5 for row in rows)
     (['sweep in every cell', 'polynomial of degree 3', 'Gaussian process'], True)
     """
-    seeds = check_seeds(seeds, quick=quick, most=2)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=2)
     work = Parts(progress)
     wanted, driven = (QUICK_CASES, _DRIVEN[:2]) if quick else (CASES, _DRIVEN)
-    every = work((f"calibrate, {case.label}", partial(_made_by, case, seeds)) for case in wanted)
+    every = work((f"calibrate, {case.label}", partial(_made_by, case, n_seeds)) for case in wanted)
     known = {maps.case: maps for maps in every}
     guided = work((f"drive, {engine}", partial(_driven_by, engine, known[PROCESS])) for engine in driven)
     cells = {name: Truth.of(cylinder) for name, cylinder in ENGINES.items()}
     own, middles = cells["as calibrated"], Truth.of(ENGINES["as calibrated"], MIDDLES)
     worn = [worn_row(name, known[PROCESS], truth, own) for name, truth in cells.items()] if PROCESS in known else []
     return work.finish(
-        "from-design-to-map", _dataset(every, guided, cells, seeds), draw if figures else None,
-        seeds=seeds,
+        "from-design-to-map", _dataset(every, guided, cells, n_seeds), draw if figures else None,
+        seeds=n_seeds,
         rows=[effort_row(maps, own, middles) for maps in every],
         parts=[row for case in _PARTED if case in known for row in part_rows(known[case], own)],
         other_engines=worn,
@@ -280,8 +280,8 @@ def run_from_design_to_map(
     )  # fmt: skip
 
 
-def _made_by(case: Case, seeds: int) -> Maps:
-    made = [make_map(case, seed, noise_free=case in _PARTED) for seed in range(seeds)]
+def _made_by(case: Case, n_seeds: int) -> Maps:
+    made = [make_map(case, seed, noise_free=case in _PARTED) for seed in range(n_seeds)]
     return Maps(case=case, made=made)
 
 
@@ -301,11 +301,11 @@ def _driven_by(engine: str, maps: Maps) -> Guided:
     return Guided(engine=engine, drives=drives, before=before, after=after)
 
 
-def _dataset(every: list[Maps], guided: list[Guided], cells: dict[str, Truth], seeds: int) -> xr.Dataset:
+def _dataset(every: list[Maps], guided: list[Guided], cells: dict[str, Truth], n_seeds: int) -> xr.Dataset:
     own, shape = cells["as calibrated"], [entries.size for entries in AXES.values()]
     variables: dict[str, tuple[Any, ...]] = {
         "way": ("way", [maps.case.label for maps in every], "-", "fit, points and averaged cycles of each"),
-        "seed": ("seed", np.arange(seeds), "-", "seed"),
+        "seed": ("seed", np.arange(n_seeds), "-", "seed"),
         "speed_rpm": ("speed_rpm", AXES["speed_rpm"], "rpm", "engine speed"),
         "fuel_mg": ("fuel_mg", AXES["fuel_mg"], "mg", "fuel"),
         "engine_cycles": (

@@ -74,7 +74,7 @@ class _Step:
 
 
 def run_guide_accuracy(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Measure what a wrong guide costs after a load step, and how curve-guided seeking takes what no guide knows.
 
@@ -86,7 +86,7 @@ def run_guide_accuracy(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of every case.
     quick : bool
         At most six seeds.
@@ -109,25 +109,25 @@ def run_guide_accuracy(
     Examples
     --------
     >>> from mgdd_studies.guide_accuracy import run_guide_accuracy
-    >>> result = run_guide_accuracy(seeds=2, quick=True, figures=False)
+    >>> result = run_guide_accuracy(n_seeds=2, quick=True, figures=False)
     >>> rows = {(row["form"], row["guide"]): row for row in result.summary["rows"]}
     >>> rows["feed-forward", "wall heat +30 %"]["lost"] < 0.5 * rows["feed-forward", "none"]["lost"]
     True
     """
-    seeds = check_seeds(seeds, quick=quick, most=6)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=6)
     work = Parts(progress)
     maps = [SteadyMap.of(VirtualEngine(point=point)) for point in (LOW, HIGH)]
     plain: list[Guide | None] = [None, *GUIDES]
     wanted = [("feed-forward", guide) for guide in plain] + [("curve", guide) for guide in GUIDES]
     done = work(
-        (f"load step, {form}, {'none' if guide is None else guide.name}", partial(_step, form, guide, maps[1], seeds))
+        (f"load step, {form}, {'none' if guide is None else guide.name}", partial(_step, form, guide, maps[1], n_seeds))
         for form, guide in wanted
     )
-    trouble = work((case.name, partial(run_hard, case, seeds)) for case in HARD)
+    trouble = work((case.name, partial(run_hard, case, n_seeds)) for case in HARD)
     rows = [_row(step, done, maps) for step in done]
     return work.finish(
         "guide-accuracy", _dataset(done, trouble, maps), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=rows,
         trouble=[hard.row for hard in trouble],
         bars=_bars(rows) + hard_bars(trouble),
@@ -136,10 +136,10 @@ def run_guide_accuracy(
     )  # fmt: skip
 
 
-def _step(form: str, guide: Guide | None, after: SteadyMap, seeds: int) -> _Step:
+def _step(form: str, guide: Guide | None, after: SteadyMap, n_seeds: int) -> _Step:
     lost, back, final, refused, estimates = [], [], [], [], []
     curve_at = None if guide is None else guide.curve
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         bench = VirtualEngine(schedule=[(0, LOW), (SETTLED, HIGH)], soc_scatter_cad=0.0, seed=seed)
         seeker = curve_seeker(guide.curve(LOW)) if guide is not None and form == "curve" else trimmed(guide)
         first = drive(bench, seeker, SETTLED + _TEST_CYCLES, curve_at=curve_at)
@@ -211,7 +211,7 @@ def _dataset(done: list[_Step], trouble: list[Hard], maps: list[SteadyMap]) -> x
         "run": ("run", [f"{step.form}, {step.name}" for step in done], "-", "form and guide"),
         "seed": ("seed", np.arange(done[0].lost.size), "-", "seed"),
         "cycle": ("cycle", np.arange(-50, JUDGED)),
-        "lost": (own, [step.lost for step in done], "%", "J lost over the 200 cycles after the load step"),
+        "lost": (own, [step.lost for step in done], "%", "loss of efficiency over the 200 cycles after the load step"),
         "cycles_back": (own, [step.back for step in done], "-", "first cycle within 1 °CA after the step"),
         "final_cad": (own, [step.final for step in done], cad, "mean estimate of the last 400 cycles"),
         "optimum_before_cad": ((), maps[0].best_cad, cad, "optimum before the load step"),
@@ -272,10 +272,10 @@ HARD: tuple[HardCase, ...] = (
     HardCase(name="jump by 6 CAD, wall heat +30 %", jump_cad=6.0),
     HardCase(name="jump by -6 CAD, wall heat +30 %", jump_cad=-6.0),
     HardCase(name="jump by 6 CAD, adiabatic", guide="adiabatic", jump_cad=6.0),
-    HardCase(name="J late, delay known", start_cad=-20.0, told_delay=38.0, reading_noise_percent=0.25),
-    HardCase(name="J late, delay given 4 short", start_cad=-20.0, told_delay=34.0, reading_noise_percent=0.25),
-    HardCase(name="J late, delay given 4 long", start_cad=-20.0, told_delay=42.0, reading_noise_percent=0.25),
-    HardCase(name="J late, noise before the lag only", start_cad=-20.0, told_delay=38.0),
+    HardCase(name="efficiency late, delay known", start_cad=-20.0, told_delay=38.0, reading_noise_percent=0.25),
+    HardCase(name="efficiency late, delay given 4 short", start_cad=-20.0, told_delay=34.0, reading_noise_percent=0.25),
+    HardCase(name="efficiency late, delay given 4 long", start_cad=-20.0, told_delay=42.0, reading_noise_percent=0.25),
+    HardCase(name="efficiency late, noise before the lag only", start_cad=-20.0, told_delay=38.0),
     HardCase(name="cliff behind the optimum, wall heat +30 %", start_cad=-20.0, cliff=True),
     HardCase(name="cliff behind the optimum, from its steep side", start_cad=0.0, cliff=True),
     HardCase(name="three times the noise, parabola", guide=None, start_cad=-20.0, noise_percent=0.75),
@@ -292,7 +292,7 @@ class Hard:
     error: NDArray[np.float64]
 
 
-def run_hard(case: HardCase, seeds: int) -> Hard:
+def run_hard(case: HardCase, n_seeds: int) -> Hard:
     """Run a case; a jump or drift is a combustion that comes later than asked for, so that J keeps its height."""
     curve, steady = case.curve(), SteadyMap.of(VirtualEngine())
     best = steady.best_cad
@@ -302,7 +302,7 @@ def run_hard(case: HardCase, seeds: int) -> Hard:
         return -_CLIFF_PER_CAD * np.maximum(soc_cad - best, 0.0) if case.cliff else 0.0 * np.asarray(soc_cad)
 
     errors, lost, inside = [], [], []
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         rng = np.random.default_rng(seed)
 
         def told(soc_cad: float, rng: np.random.Generator = rng) -> float:
@@ -349,13 +349,13 @@ def hard_bars(done: list[Hard]) -> list[dict[str, Any]]:
     wanted = (
         ("jump: back within 2 CAD, median [cycles]", values("median_back", lambda c: c.jump_cad), 6.0),
         ("jump: back within 2 CAD, 95th percentile [cycles]", values("back_95_percent", lambda c: c.jump_cad), 25.0),
-        ("J late: first within 1 CAD, median [cycles]", values("median_first", lambda c: c.told_delay == _DELAY), 45.0),
+        ("efficiency late: to 1 CAD, median [cycles]", values("median_first", lambda c: c.told_delay == _DELAY), 45.0),
         (
-            "J late, delay given ±4: lost runs [%]",
+            "efficiency late, delay given ±4: lost runs [%]",
             values("lost_runs_percent", lambda c: c.told_delay in (34.0, 42.0)), 0.0,
         ),
         (
-            "J late, noise before the lag only: lost runs [%]",
+            "efficiency late, noise before the lag only: lost runs [%]",
             values("lost_runs_percent", lambda c: c.told_delay is not None and not c.reading_noise_percent), 0.0,
         ),
         ("cliff: loss of the last 200 cycles [points]", values("late_loss_percent", lambda c: c.cliff), 0.05),

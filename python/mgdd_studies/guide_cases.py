@@ -109,7 +109,7 @@ GUIDES: tuple[Guide, ...] = (
 def seeker_without_clip() -> ExtremumSeeking:
     """Make extremum seeking with a moving average, no clip, start at -20 CAD: what a feed-forward leads."""
     return ExtremumSeeking(
-        start=_UNGUIDED_START_CAD, lower=_WIDE_CAD[0], upper=_WIDE_CAD[1], form="moving_average", gain=_GAIN,
+        start=_UNGUIDED_START_CAD, bounds=_WIDE_CAD, form="moving_average", gain=_GAIN,
         amplitude=1.0, rate=math.inf,
     )  # fmt: skip
 
@@ -127,7 +127,7 @@ def trimmed(guide: Callable[[OperatingPoint], Optimum] | None) -> FeedForward:
 def curve_seeker(curve: Curve, *, start: float | None = None, delay: float = 0.0, lag: float = 0.0) -> CurveSeeking:
     """Make a seeker by the curve with default settings; it starts at the curve's best input by default."""
     return CurveSeeking(
-        start=curve.best if start is None else start, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], curve=curve,
+        start=curve.best if start is None else start, bounds=BOUNDS_CAD, curve=curve,
         delay_cycles=delay, lag_cycles=lag,
     )  # fmt: skip
 

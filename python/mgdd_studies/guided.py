@@ -14,7 +14,7 @@ from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus, new_figure
-from mgdd.results.labels import labelled_dataset
+from mgdd.results.labels import label_of, labelled_dataset
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd_studies import measured_engine_cases as measured
@@ -62,6 +62,7 @@ _LIMITED_CASES = tuple(
 class _Engine:
     """A plant, its optimum, its J over timing without noise, and its guide."""
 
+    objective: str  # what J is
     unit: str
     start_cad: float
     bounds_cad: tuple[float, float]
@@ -82,7 +83,7 @@ class _Engine:
         shape = self.curve
         if case == "parabola":
             shape = Curve.parabola(curvature=self.bend, best=led_cad, reach=_REACH_CAD)
-        return CurveSeeking(start=led_cad, lower=self.bounds_cad[0], upper=self.bounds_cad[1], curve=shape)
+        return CurveSeeking(start=led_cad, bounds=self.bounds_cad, curve=shape)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +137,12 @@ class LimitedRuns(Runs):
 
 
 def run_guided(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, real: bool = False, progress: Progress | None = None
+    *,
+    n_seeds: int = 200,
+    quick: bool = False,
+    figures: bool = True,
+    real: bool = False,
+    progress: Progress | None = None,
 ) -> StudyResult:
     """Start an engine with a rough model and without one, and count cycles and the J that is lost.
 
@@ -150,7 +156,7 @@ def run_guided(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs per case.
     quick : bool
         At most twenty seeds.
@@ -176,20 +182,20 @@ def run_guided(
     Examples
     --------
     >>> from mgdd_studies.guided import run_guided
-    >>> rows = run_guided(seeds=8, figures=False).summary["rows"]
+    >>> rows = run_guided(n_seeds=8, figures=False).summary["rows"]
     >>> [row["case"] for row in rows], 5 * rows[2]["cycles_to_1_cad"] < rows[0]["cycles_to_1_cad"]
     (['unguided', 'feed_forward', 'curve', 'parabola'], True)
     """
-    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=_QUICK_SEEDS)
     work = Parts(progress)
     work.progress("drawing the guide")
     engine = _measured_engine() if real else _bench_engine()
-    runs = work((case, partial(_run, engine, case, seeds)) for case in _CASES)
-    limited = work(limited_parts(measured.measured_records(_NAME), seeds, _CYCLES)) if real else []
+    runs = work((case, partial(_run, engine, case, n_seeds)) for case in _CASES)
+    limited = work(limited_parts(measured.measured_records(_NAME), n_seeds, _CYCLES)) if real else []
     return work.finish(
         _NAME, _dataset(engine, runs, limited), _draw if figures else None,
         plant="surrogate of the measured engine" if real else "virtual bench",
-        seeds=seeds,
+        seeds=n_seeds,
         cycles=_CYCLES,
         unit_of_j=engine.unit,
         optimum_cad=engine.best_cad,
@@ -205,6 +211,7 @@ def _bench_engine() -> _Engine:
     model = ModelOptimum(bench.settings["cylinder"].replace(wall_heat_scale=_WRONG_WALL_HEAT), bounds_cad=bounds)
     gain = approach_gain(abs(best.curvature), _TIME_CONSTANT, amplitude=_AMPLITUDE_CAD)
     return _Engine(
+        objective="efficiency",
         unit="%",
         start_cad=-20.0,
         bounds_cad=bounds,
@@ -215,9 +222,7 @@ def _bench_engine() -> _Engine:
         curve=measured.drawn_curve(model, bench.point),
         bend=_BEND,
         plant=_bench_plant,
-        plain=partial(
-            ExtremumSeeking, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
-        ),
+        plain=partial(ExtremumSeeking, bounds=bounds, amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain),
     )
 
 
@@ -235,7 +240,7 @@ def _measured_engine() -> _Engine:
     guide = measured.measured_guide(records)
     settings = {name: value for name, value in measured.seeker_of(case, 0).settings.items() if name != "start"}
     return _Engine(
-        unit="bar", start_cad=measured.START_CAD, bounds_cad=bounds, best_cad=case.best["soi_cad"],
+        objective="IMEP", unit="bar", start_cad=measured.START_CAD, bounds_cad=bounds, best_cad=case.best["soi_cad"],
         best_j=case.best.value, grid_cad=grid, steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
         curve=guide.curve, bend=_BEND * guide.bar_per_point, plant=partial(_measured_plant, surrogate),
         plain=partial(ExtremumSeeking, **settings),
@@ -246,17 +251,17 @@ def _measured_plant(surrogate: EngineSurrogate, seed: int, start_cad: float) -> 
     return SurrogatePlant(surrogate, "imep_bar", start_soi_cad=start_cad, seed=seed)
 
 
-def _run(engine: _Engine, case: str, seeds: int) -> Runs:
-    estimate, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
+def _run(engine: _Engine, case: str, n_seeds: int) -> Runs:
+    estimate, lost = np.empty((n_seeds, _CYCLES)), np.empty((n_seeds, _CYCLES))
     start = float(engine.seeker(case).estimate[0])
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         cycles = run_seeker(engine.plant(seed, start), engine.seeker(case), _CYCLES).dataset
         estimate[seed] = cycles["estimate"][:, 0]
         lost[seed] = engine.best_j - np.interp(cycles["applied"][:, 0], engine.grid_cad, engine.steady_j)
     return Runs(case=case, start_cad=start, best_cad=engine.best_cad, estimate=estimate, lost=lost)
 
 
-def limited_parts(records: xr.Dataset, seeds: int, cycles: int) -> Iterator[tuple[str, Callable[[], LimitedRuns]]]:
+def limited_parts(records: xr.Dataset, n_seeds: int, cycles: int) -> Iterator[tuple[str, Callable[[], LimitedRuns]]]:
     """Give each case with a limit as a part of the study."""
     surrogate, guide = fit_surrogate(records), measured.measured_guide(records)
     case = measured.tuned_case(surrogate, _OBJECTIVE, "batch", measured.held_objective(surrogate, _OBJECTIVE))
@@ -268,20 +273,20 @@ def limited_parts(records: xr.Dataset, seeds: int, cycles: int) -> Iterator[tupl
             )
         else:
             make = partial(
-                CurveSeeking, start=measured.START_CAD, lower=measured.LOWER_CAD, upper=measured.UPPER_CAD,
+                CurveSeeking, start=measured.START_CAD, bounds=(measured.LOWER_CAD, measured.UPPER_CAD),
                 curve=guide.curve, limits=limits, limit_curves=[guide.pressure_rise] if form == "curve" else None,
             )  # fmt: skip
-        yield f"limited: {name}", partial(_run_limited, surrogate, case, name, make, seeds, cycles)
+        yield f"limited: {name}", partial(_run_limited, surrogate, case, name, make, n_seeds, cycles)
 
 
 def _run_limited(
-    surrogate: EngineSurrogate, case: measured.Case, name: str, make: Callable[[], Any], seeds: int, cycles: int
+    surrogate: EngineSurrogate, case: measured.Case, name: str, make: Callable[[], Any], n_seeds: int, cycles: int
 ) -> LimitedRuns:
     grid = np.arange(measured.LOWER_CAD, measured.UPPER_CAD + 0.5 * _FINE_CAD, _FINE_CAD)
     (limited, upper), *_ = _OBJECTIVE.limits.items()
     surface = surrogate.predict(grid)
-    estimate, lost, rise = (np.empty((seeds, cycles)) for _ in range(3))
-    for seed in range(seeds):
+    estimate, lost, rise = (np.empty((n_seeds, cycles)) for _ in range(3))
+    for seed in range(n_seeds):
         plant = SurrogatePlant(
             surrogate, _OBJECTIVE.weights, limits=[limited], start_soi_cad=measured.START_CAD, seed=seed
         )
@@ -301,13 +306,13 @@ def _dataset(engine: _Engine, runs: list[Runs], limited: list[LimitedRuns]) -> x
         "case": ("case", [run.case for run in runs], "-", "what guides"),
         "cycle": ("cycle", np.arange(_CYCLES)),
         "timing_cad": ("timing_cad", engine.grid_cad, cad, "timing"),
-        "steady_j": ("timing_cad", engine.steady_j, engine.unit, "J without noise"),
-        "guide_j": ("timing_cad", np.asarray(engine.curve(engine.grid_cad)), engine.unit, "J by the guide"),
+        "steady_j": ("timing_cad", engine.steady_j, engine.unit, f"{engine.objective} without noise"),
+        "guide_j": ("timing_cad", engine.curve(engine.grid_cad), engine.unit, f"{engine.objective} by the guide"),
         "optimum_cad": ((), engine.best_cad, cad, "best timing"),
         **band_variables("estimate_{}_cad", over, [run.estimate for run in runs], cad, OF_SEEDS),
         "lost_j_cycles": (
             over, [np.cumsum(run.lost, axis=1).mean(axis=0) for run in runs], engine.unit,
-            "J lost so far, summed over cycles, mean of the seeds",
+            f"loss of {engine.objective} so far, summed over cycles, mean of the seeds",
         ),
     }  # fmt: skip
     if limited:
@@ -332,15 +337,20 @@ def _dataset(engine: _Engine, runs: list[Runs], limited: list[LimitedRuns]) -> x
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    what = _objective(dataset)
     out = {
-        "Estimates and J lost since the start, median and mean of the seeds; the bands hold 80 %": _starts(dataset),
-        "J of the engine and of its guide over timing, each from its own maximum": _curves(dataset),
+        f"Estimates and loss of {what}, median and mean of the seeds; the bands hold 80 %": _starts(dataset),
+        f"{what} of the engine and of its guide over timing, each from its own maximum": _curves(dataset),
     }
     if "limited_case" in dataset:
         out["Under a limit of the pressure rise: estimate and true pressure rise, medians; the bands hold 80 %"] = (
             _limited(dataset)
         )
     return out
+
+
+def _objective(dataset: xr.Dataset) -> str:
+    return str(dataset["steady_j"].attrs["long_name"]).removesuffix(" without noise")
 
 
 def _starts(dataset: xr.Dataset) -> Figure:
@@ -359,7 +369,8 @@ def _starts(dataset: xr.Dataset) -> Figure:
     best = float(dataset["optimum_cad"])
     lines.append(above.axhline(best, color=GREY, linewidth=1.0, label=minus(f"best timing: {best:.1f} °CA aTDC")))
     above.set_ylabel("timing [°CA aTDC]")
-    below.set_ylabel(f"J lost since the start [{dataset['steady_j'].attrs['units']} × cycles]".replace("percent", "%"))
+    units = label_of(dataset["steady_j"]).units
+    below.set_ylabel(f"loss of {_objective(dataset)} since the start\n[{units} × cycles]")
     below.set_yscale("log")
     below.set_xlabel("cycle")
     legend(above, lines)
@@ -373,7 +384,7 @@ def _curves(dataset: xr.Dataset) -> Figure:
     lines = ax.plot(dataset["timing_cad"], own - own.max(), color=BLACK, label="engine")
     lines += ax.plot(dataset["timing_cad"], guide - guide.max(), color=LINE_STYLES[1][1], linestyle="--", label="guide")
     ax.set_xlabel("timing [°CA aTDC]")
-    ax.set_ylabel(f"J less its maximum [{own.attrs['units']}]".replace("percent", "%"))
+    ax.set_ylabel(f"{_objective(dataset)} less its maximum [{label_of(own).units}]")
     legend(ax, lines)
     return figure
 

@@ -99,7 +99,7 @@ class _Outcome:
 
 
 def run_guided_start_up(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Count the cycles from the start to the optimum, with a guide that is wrong in a stated way.
 
@@ -111,7 +111,7 @@ def run_guided_start_up(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of every case.
     quick : bool
         At most eight seeds.
@@ -134,19 +134,19 @@ def run_guided_start_up(
     Examples
     --------
     >>> from mgdd_studies.guided_start_up import run_guided_start_up
-    >>> result = run_guided_start_up(seeds=4, quick=True, figures=False)
+    >>> result = run_guided_start_up(n_seeds=4, quick=True, figures=False)
     >>> rows = {row["guide"]: row for row in result.summary["rows"]}
     >>> rows["wall heat +30 %"]["cycles_to_1_cad"] < 0.5 * rows["none"]["cycles_to_1_cad"]
     True
     """
-    seeds = check_seeds(seeds, quick=quick, most=8)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=8)
     work = Parts(progress)
     steady = SteadyMap.of(VirtualEngine(point=LOW))
     trims = [("none", None), *((guide.name, guide) for guide in _TRIM)]
-    done = work((f"feed-forward, {name}", partial(_trim, guide, steady, seeds)) for name, guide in trims)
+    done = work((f"feed-forward, {name}", partial(_trim, guide, steady, n_seeds)) for name, guide in trims)
     curves = work(
         (f"curve, {case.name}, start at {'the guide' if near else case.far_start_cad}",
-         partial(_seek, case, near, seeds))
+         partial(_seek, case, near, n_seeds))
         for case in _CASES for near in (True, False)
     )  # fmt: skip
     for outcome in done:
@@ -154,7 +154,7 @@ def run_guided_start_up(
         outcome.row["times_fewer"] = done[0].row["cycles_to_1_cad"] / cycles if cycles >= 1.0 else None
     return work.finish(
         "guided-start-up", _dataset(done, curves, steady), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[outcome.row for outcome in done],
         curve=[outcome.row for outcome in curves],
         bars=_bars([outcome.row for outcome in done], [outcome.row for outcome in curves]),
@@ -163,11 +163,11 @@ def run_guided_start_up(
     )  # fmt: skip
 
 
-def _trim(guide: Guide | None, steady: SteadyMap, seeds: int) -> _Outcome:
+def _trim(guide: Guide | None, steady: SteadyMap, n_seeds: int) -> _Outcome:
     best = steady.best_cad
     runs = [
         drive(VirtualEngine(point=LOW, soc_scatter_cad=0.0, seed=seed), trimmed(guide), TRIM_CYCLES).estimate
-        for seed in range(seeds)
+        for seed in range(n_seeds)
     ]
     cycles = np.array([first_within(estimate, best, ARRIVAL_CAD) for estimate in runs])
     arrived = np.where(np.isfinite(cycles), cycles, np.nan)
@@ -181,13 +181,13 @@ def _trim(guide: Guide | None, steady: SteadyMap, seeds: int) -> _Outcome:
     return _Outcome(row=row, estimates=np.stack(runs), cycles=cycles)
 
 
-def _seek(case: _Case, near: bool, seeds: int) -> _Outcome:
+def _seek(case: _Case, near: bool, n_seeds: int) -> _Outcome:
     curve = case.curve()
     start = curve.best if near else case.far_start_cad
     steady = SteadyMap.of(VirtualEngine(case.plant, case.point))
     best = steady.best_cad
     runs, lost, inside, handed = [], [], [], []
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         seeker = curve_seeker(curve, start=start)
         run = drive(VirtualEngine(case.plant, case.point, seed=seed), seeker, CURVE_CYCLES)
         error = run.estimate[LATE:] - best

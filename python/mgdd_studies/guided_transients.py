@@ -91,7 +91,7 @@ class _Drive:
 
 
 def run_guided_transients(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Measure the efficiency lost over a sequence of twelve operating points, and after a step to each cell of a plane.
 
@@ -102,7 +102,7 @@ def run_guided_transients(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of the sequence.
     quick : bool
         At most two seeds, and a plane of 3 x 3 cells.
@@ -124,34 +124,34 @@ def run_guided_transients(
     Examples
     --------
     >>> from mgdd_studies.guided_transients import run_guided_transients
-    >>> result = run_guided_transients(seeds=1, quick=True, figures=False)
+    >>> result = run_guided_transients(n_seeds=1, quick=True, figures=False)
     >>> all(row["lost_over_unguided"] < 0.7 for row in result.summary["rows"][1:])
     True
     """
-    seeds = check_seeds(seeds, quick=quick, most=2)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=2)
     work = Parts(progress)
     points = [OperatingPoint(speed_rpm=speed, fuel_mg=fuel) for speed, fuel in SEQUENCE]
     maps = [SteadyMap.of(VirtualEngine(point=point)) for point in points]
     plane = SpeedLoadPlane.of(quick=quick)
     wanted = [("none", "none"), *((form, name) for form in ("feed-forward", "curve") for name in _GUIDES)]
     done = work(
-        (f"sequence, {form}, {name}", partial(_sequence, form, name, points, maps, seeds)) for form, name in wanted
+        (f"sequence, {form}, {name}", partial(_sequence, form, name, points, maps, n_seeds)) for form, name in wanted
     )
     planes = work((f"plane, {form}, {name}", partial(run_plane, form, name, plane)) for form, name in PLANE_RUNS)
     table = [plane_row(plane, planes[0]) for plane in planes]
     return work.finish(
         "guided-transients", _dataset(done, planes, maps, plane), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[_row(own, done[0]) for own in done],
         plane=table,
         bars=_bars(table),
     )  # fmt: skip
 
 
-def _sequence(form: str, name: str, points: list[OperatingPoint], maps: list[SteadyMap], seeds: int) -> _Drive:
+def _sequence(form: str, name: str, points: list[OperatingPoint], maps: list[SteadyMap], n_seeds: int) -> _Drive:
     schedule = [(_DWELL * at, point) for at, point in enumerate(points)]
     lost, estimates = [], []
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         bench = VirtualEngine(schedule=schedule, seed=seed)
         run = drive(bench, guided_by(form, _BY_NAME.get(name), points[0]), _DWELL * len(points))
         parts = run.applied.reshape(len(points), _DWELL)
@@ -205,9 +205,9 @@ def _dataset(done: list[_Drive], planes: list[Plane], maps: list[SteadyMap], pla
         "run": ("run", [_named(own.form, own.guide) for own in done], "-", "form and guide"),
         "cycle": ("cycle", np.arange(cycles)),
         "middle_cycle": ("middle_cycle", np.arange(_BIN / 2, cycles, _BIN), "-", "engine cycle"),
-        "lost_per_100": (run, bins, "%", "J lost per 100 cycles"),
-        "lost_per_100_low": (run, lows, "%", "J lost per 100 cycles, low end of the interval"),
-        "lost_per_100_high": (run, highs, "%", "J lost per 100 cycles, high end of the interval"),
+        "lost_per_100": (run, bins, "%", "loss of efficiency per 100 cycles"),
+        "lost_per_100_low": (run, lows, "%", "loss of efficiency per 100 cycles, low end of the interval"),
+        "lost_per_100_high": (run, highs, "%", "loss of efficiency per 100 cycles, high end of the interval"),
         "estimate_cad": (("run", "cycle"), [np.median(own.estimate, axis=0) for own in done], cad, "median estimate"),
         "optimum_cad": ("cycle", np.repeat([own.best_cad for own in maps], _DWELL), cad, "optimum"),
         "speed_rpm": ("cycle", np.repeat([speed for speed, _ in SEQUENCE], _DWELL), "rpm", "engine speed"),
@@ -220,7 +220,12 @@ def _dataset(done: list[_Drive], planes: list[Plane], maps: list[SteadyMap], pla
             "plane_speed_rpm": ("plane_speed_rpm", plane.speeds, "rpm", "engine speed"),
             "plane_fuel_mg": ("plane_fuel_mg", plane.fuels, "mg", "fuel per cycle"),
             "plane_cycles": (dims, [own.cycles for own in planes], "-", "cycles to 1 °CA after the step"),
-            "plane_lost": (dims, [own.lost for own in planes], "%", "J lost over 200 cycles after the step"),
+            "plane_lost": (
+                dims,
+                [own.lost for own in planes],
+                "%",
+                "loss of efficiency over 200 cycles after the step",
+            ),
         }
     return labelled_dataset(variables)
 
@@ -244,7 +249,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     timing.plot(cycle, dataset["optimum_cad"], ":", color=GREY, linewidth=1.4, label="optimum")
     timing.set(ylabel="estimate of the best\ntiming [°CA aTDC]", ylim=(-20.5, 2.0))
     timing.legend(ncols=2, fontsize="small", loc="lower right")
-    loss.set(ylabel="J lost per 100 cycles\n[points × cycles]", yscale="log")
+    loss.set(ylabel="loss of efficiency per 100 cycles\n[points × cycles]", yscale="log")
     point.plot(cycle, dataset["speed_rpm"], "-", color=BLACK)
     point.set(ylabel="speed [rpm]", xlabel="engine cycle [-]", xlim=(0, cycle.size))
     fuel = point.twinx()

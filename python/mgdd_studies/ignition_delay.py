@@ -62,7 +62,7 @@ class _Runs:
 
 
 def run_ignition_delay(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Turn the best SOC of a right cycle model into SOI by a wrong correlation, and see what that costs.
 
@@ -73,7 +73,7 @@ def run_ignition_delay(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs per form and correlation.
     quick : bool
         At most four seeds, and a plane of 3 x 3 cells.
@@ -94,11 +94,11 @@ def run_ignition_delay(
     Examples
     --------
     >>> from mgdd_studies.ignition_delay import run_ignition_delay
-    >>> rows = run_ignition_delay(seeds=1, quick=True, figures=False).summary["rows"]
+    >>> rows = run_ignition_delay(n_seeds=1, quick=True, figures=False).summary["rows"]
     >>> [row["lost_mean"] for row in rows if row["truth"] == row["assumed"]]
     [0.0, 0.0, 0.0]
     """
-    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=_QUICK_SEEDS)
     work = Parts(progress)
     work.progress("maps of the plane")
     plane = SpeedLoadPlane.of(quick=quick)
@@ -107,12 +107,12 @@ def run_ignition_delay(
         for truth in TRUTHS for assumed in assumed_laws(truth)
     )  # fmt: skip
     runs = work(
-        (f"{form}, assumed {assumed.name}", partial(_runs, form, assumed, seeds))
+        (f"{form}, assumed {assumed.name}", partial(_runs, form, assumed, n_seeds))
         for form in ("feed-forward", "curve") for assumed in assumed_laws(TRUTHS[0])
     )  # fmt: skip
     return work.finish(
         "ignition-delay", _dataset(planes, runs, plane), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[plane_row(plane) for plane in planes],
         slopes=[slope_row(plane) for plane in planes if plane.truth == plane.assumed],
         intake=[_intake_row(law) for law in TRUTHS],
@@ -141,14 +141,14 @@ def plane_of(truth: DelayLaw, assumed: DelayLaw, plane: SpeedLoadPlane) -> Plane
 
 
 def _lost(truth: DelayLaw, own: SteadyMap, point: OperatingPoint, soi_cad: float, best_soi_cad: float) -> float:
-    """Give J lost by an injection against the best that the truth can reach; infinite where nothing ignites."""
+    """Give the efficiency lost by an injection against the best that the truth can reach; infinite without ignition."""
     soc = truth.soc_of(point, min(max(soi_cad, SOI_CAD[0]), SOI_CAD[-1]))
     lost, least = own.lost(np.array([soc, truth.soc_of(point, best_soi_cad)])).tolist()
     return float(lost - least) if np.isfinite(soc) else np.inf
 
 
 def plane_row(plane: Plane) -> dict[str, Any]:
-    """Give size of the error and J lost, before and after the trim."""
+    """Give size of the error and efficiency lost, before and after the trim."""
     left = plane.soi_error_cad + plane.trim_cad
 
     def losses(lost: NDArray[np.float64], end: str = "") -> dict[str, Any]:
@@ -200,16 +200,16 @@ def _intake_row(law: DelayLaw) -> dict[str, Any]:
     return row
 
 
-def _runs(form: str, assumed: DelayLaw, seeds: int) -> _Runs:
+def _runs(form: str, assumed: DelayLaw, n_seeds: int) -> _Runs:
     truth, guide = TRUTHS[0], InjectionGuide(assumed)
     points = (MEASURED_AT, AFTER)
     maps = [SteadyMap.of(VirtualEngine(point=point)) for point in points]
-    estimates, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
-    for seed in range(seeds):
+    estimates, lost = np.empty((n_seeds, _CYCLES)), np.empty((n_seeds, _CYCLES))
+    for seed in range(n_seeds):
         bench = VirtualEngine(schedule=[(0, MEASURED_AT), (_STEP_AT, AFTER)], seed=seed)
         if form == "curve":
             curve, (low, high) = guide.curve(MEASURED_AT), _BOUNDS_SOI_CAD
-            seeker: Any = CurveSeeking(start=curve.best, lower=low, upper=high, curve=curve)
+            seeker: Any = CurveSeeking(start=curve.best, bounds=(low, high), curve=curve)
         else:
             seeker = trimmed(guide)
         run = drive(bench, seeker, _CYCLES, curve_at=guide.curve, soc_of=truth.soc_of)
@@ -252,8 +252,8 @@ def _dataset(planes: list[Plane], runs: list[_Runs], plane: SpeedLoadPlane) -> x
         "left_error_cad": (
             dims, [own.soi_error_cad + own.trim_cad for own in planes], "°CA", "error that the trim leaves",
         ),
-        "lost": (dims, [own.lost for own in planes], "%", "J lost by the injection of the guide"),
-        "lost_trimmed": (dims, [own.lost_trimmed for own in planes], "%", "J lost with the trim of one point"),
+        "lost": (dims, [own.lost for own in planes], "%", "loss of efficiency by the guide's injection"),
+        "lost_trimmed": (dims, [own.lost_trimmed for own in planes], "%", "loss with the trim of one point"),
         "law": ("law", [law.name for law in TRUTHS], "-", "correlation"),
         "soi_cad": ("soi_cad", SOI_CAD),
         "delay_cad": (("law", "soi_cad"), laws, "°CA", "ignition delay"),
@@ -266,7 +266,12 @@ def _dataset(planes: list[Plane], runs: list[_Runs], plane: SpeedLoadPlane) -> x
             "run": ("run", [f"{run.form}, {run.assumed}" for run in runs], "-", "form and assumed correlation"),
             **band_variables("estimate_{}_cad", ("run", "cycle"), [run.estimate for run in runs], cad, OF_SEEDS),
             "middle_cycle": ("middle_cycle", np.arange(_BIN / 2, _CYCLES, _BIN), "-", "engine cycle"),
-            "mean_lost": (("run", "middle_cycle"), lost, "%", "J lost per cycle, mean of the seeds and of 20 cycles"),
+            "mean_lost": (
+                ("run", "middle_cycle"),
+                lost,
+                "%",
+                "loss of efficiency per cycle, mean of the seeds and of 20 cycles",
+            ),
             "optimum_cad": ("cycle", best, cad, "right start of injection"),
         }
     return labelled_dataset(variables)
@@ -280,11 +285,13 @@ _SHOWN = ("Watson", "Hardenberg-Hase", "polynomial of 1500 rpm", "no delay")
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     out = {
         "Ignition delay over the start of injection at 1500 rpm, three correlations": _delays(dataset),
-        "Error of the guide's injection where Watson's correlation is true; the numbers are J lost [points] with the "
+        "Error of the guide's injection where Watson's correlation is true; the numbers are the loss [points] with the "
         "trim of 1500 rpm and 20 mg": _draw_plane(dataset),
     }
     if "run" in dataset:
-        out["Start and step by wrong correlations: median of the estimate, and J lost per cycle"] = _draw_runs(dataset)
+        out["Start and step by wrong correlations: median of the estimate, and loss of efficiency per cycle"] = (
+            _draw_runs(dataset)
+        )
     return out
 
 
@@ -341,7 +348,7 @@ def _draw_runs(dataset: xr.Dataset) -> Figure:
         above.set_title(form, loc="left", fontsize="small")
         below.set(xlabel="engine cycle [-]", yscale="log")
     axes[0, 0].set_ylabel("estimate of the best SOI\n[°CA aTDC]")
-    axes[1, 0].set_ylabel("J lost per cycle [points]")
+    axes[1, 0].set_ylabel("loss of efficiency per cycle [points]")
     for ax in axes.flat:
         ax.grid(alpha=0.3)
     legend_outside(figure, axes[0, 0], 5)

@@ -136,7 +136,7 @@ def noise_at(held: NDArray[np.float64], period: int) -> float:
 
 def seeker_of(case: Case, seed: int) -> Seeker:
     """Make the seeker of a case; `seed` is that of SPSA."""
-    space: dict[str, Any] = {"start": START_CAD, "lower": LOWER_CAD, "upper": UPPER_CAD}
+    space: dict[str, Any] = {"start": START_CAD, "bounds": (LOWER_CAD, UPPER_CAD)}
     # Judged by the optimum at the limit itself: a margin for the scatter of single cycles would be 3.5 °CA of timing.
     space["limits"] = [Limit(name, upper, margin_sd=0.0) for name, upper in case.objective.limits.items()]
     t, components = case.tuning, list(case.lags) or None

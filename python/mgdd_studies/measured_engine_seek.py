@@ -70,7 +70,7 @@ class _Runs:
 
 
 def run_measured_engine_seek(
-    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Let every seeker look for the best injection timing of the measured hydrogen-diesel engine.
 
@@ -82,7 +82,7 @@ def run_measured_engine_seek(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs per seeker and objective.
     quick : bool
         At most three seeds and 600 instead of 1500 cycles.
@@ -111,10 +111,10 @@ def run_measured_engine_seek(
     >>> from mgdd import datasets
     >>> from mgdd_studies.measured_engine_seek import run_measured_engine_seek
     >>> if "h2df_502" in datasets.names():
-    ...     result = run_measured_engine_seek(seeds=1, quick=True, figures=False)
+    ...     result = run_measured_engine_seek(n_seeds=1, quick=True, figures=False)
     ...     assert len(result.summary["rows"]) == 7
     """
-    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=_QUICK_SEEDS)
     work = Parts(progress)
     cycles = _QUICK_CYCLES if quick else _CYCLES
     work.progress("fitting the surrogate")
@@ -124,13 +124,13 @@ def run_measured_engine_seek(
         held = held_objective(surrogate, objective)
         cases += [tuned_case(surrogate, objective, name, held) for name in objective.seekers]
     runs = work(
-        (f"{case.objective.name}: {case.seeker}", partial(_run, surrogate, case, seeds, cycles)) for case in cases
+        (f"{case.objective.name}: {case.seeker}", partial(_run, surrogate, case, n_seeds, cycles)) for case in cases
     )
     sensor = surrogate.signals["nox_ppm"].sensor
     lag = lag_of(surrogate, "nox_ppm")
     return work.finish(
         _NAME, _dataset(runs, surrogate), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         cycles=cycles,
         start_soi_cad=START_CAD,
         bounds_soi_cad=[LOWER_CAD, UPPER_CAD],
@@ -146,10 +146,10 @@ def _surrogate() -> EngineSurrogate:
     return fit_surrogate(measured_records(_NAME))
 
 
-def _run(surrogate: EngineSurrogate, case: Case, seeds: int, cycles: int) -> _Runs:
-    estimate, outside = np.empty((seeds, cycles)), np.empty((seeds, cycles))
-    signals = {name: np.empty((seeds, cycles)) for name in surrogate.signals}
-    for seed in range(seeds):
+def _run(surrogate: EngineSurrogate, case: Case, n_seeds: int, cycles: int) -> _Runs:
+    estimate, outside = np.empty((n_seeds, cycles)), np.empty((n_seeds, cycles))
+    signals = {name: np.empty((n_seeds, cycles)) for name in surrogate.signals}
+    for seed in range(n_seeds):
         plant = SurrogatePlant(
             surrogate, case.objective.weights, limits=list(case.objective.limits), start_soi_cad=START_CAD, seed=seed
         )

@@ -67,7 +67,7 @@ class Validated:
 
 
 def run_model_validation(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Set four burn laws beside four measured traces before and after calibration, and draw what the fits leave open.
 
@@ -80,7 +80,7 @@ def run_model_validation(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Draws per law and kind of error.
     quick : bool
         At most eight draws, and no family.
@@ -101,12 +101,12 @@ def run_model_validation(
     Examples
     --------
     >>> from mgdd_studies.model_validation import run_model_validation
-    >>> rows = run_model_validation(seeds=2, quick=True, figures=False).summary["rows"]
+    >>> rows = run_model_validation(n_seeds=2, quick=True, figures=False).summary["rows"]
     >>> own = [row for row in rows if row["law"] == "double Wiebe, linear gamma"]
     >>> [round(row["rmse_percent"], 1) for row in own if row["stage"] == "calibrated"]
     [0.1, 0.1, 0.1, 0.2]
     """
-    draws = check_seeds(seeds, quick=quick, most=_QUICK_DRAWS)
+    draws = check_seeds(n_seeds, quick=quick, most=_QUICK_DRAWS)
     work = Parts(progress)
     traces, cylinder = datasets.read(_ENGINE), presets.load(_ENGINE).cylinder
     done = work((law.name, partial(validate_law, law, traces, cylinder, draws)) for law in LAWS)
@@ -233,7 +233,7 @@ def _dataset(done: list[Validated], family: list[tuple[float, float]]) -> xr.Dat
         "imep_closed_error_percent": (over, table(lambda own, stage, at: own.met[stage][at].imep_closed_error_percent)),
         "best_ca50_cad": (over, table(lambda own, stage, at: own.burns[stage][at].best[0]), "°CA aTDC", "best CA50"),
         "curvature_percent": (
-            over, table(lambda own, stage, at: own.burns[stage][at].best[1]), "%/°CA²", "curvature of J over J",
+            over, table(lambda own, stage, at: own.burns[stage][at].best[1]), "%/°CA²", "curvature of the objective",
         ),
         "redrawn_ca50_cad": (
             drawn, [np.array([one.best_ca50_cad for one in own.block]).T for own in done], "°CA aTDC",

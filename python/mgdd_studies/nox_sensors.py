@@ -55,7 +55,7 @@ class _Sweep:
 
 
 def run_nox_sensors(
-    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare a NOx analyser, a fast sensor and soft sensors, steady and in transients.
 
@@ -66,7 +66,7 @@ def run_nox_sensors(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Repetitions of the sweep and of the start of the correction.
     quick : bool
         At most three seeds.
@@ -88,19 +88,19 @@ def run_nox_sensors(
     Examples
     --------
     >>> from mgdd_studies.nox_sensors import run_nox_sensors
-    >>> rows = run_nox_sensors(seeds=1, quick=True, figures=False).summary["rows"]
+    >>> rows = run_nox_sensors(n_seeds=1, quick=True, figures=False).summary["rows"]
     >>> {row["sensor"]: row["timing_step_t90_cycles"] for row in rows}["soft sensor, fitted proxy"]
     0
     """
-    seeds = check_seeds(seeds, quick=quick, most=3)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=3)
     work = Parts(progress)
-    (sweep,) = work([("sweep of injection timing", partial(_sweep, seeds))])
+    (sweep,) = work([("sweep of injection timing", partial(_sweep, n_seeds))])
     proxy = sweep.proxies["affine_log"]
     moves = work((name, partial(_step, name, proxy)) for name in _STEPS)
-    course = work([("correction of a wrong proxy", partial(_correction, seeds))])
+    course = work([("correction of a wrong proxy", partial(_correction, n_seeds))])
     return work.finish(
         "nox-sensors", _dataset(sweep, [noisy for _, noisy in moves], course), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[_row(sensor, sweep, [quiet for quiet, _ in moves]) for sensor in _NAMES],
         sweep=_sweep_rows(sweep),
         fits=sweep.fits,
@@ -108,14 +108,14 @@ def run_nox_sensors(
     )  # fmt: skip
 
 
-def _sweep(seeds: int) -> _Sweep:
+def _sweep(n_seeds: int) -> _Sweep:
     preset = presets.load("puma_single")
     soc = np.array([ignition_delay(preset.cylinder, preset.point, soi_cad=soi).soc_cad for soi in SOI_CAD])
     names = ("true", *_SENSORS)
-    means = {name: np.empty((seeds, soc.size)) for name in names}
-    temperature = np.empty((seeds, soc.size))
+    means = {name: np.empty((n_seeds, soc.size)) for name in names}
+    temperature = np.empty((n_seeds, soc.size))
     deviation: dict[str, list[float]] = {name: [] for name in names}
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         for place, timing in enumerate(soc):
             bench = VirtualEngine(soft_sensor=WRONG, seed=seed * soc.size + place)
             tail = bench.run(np.full(SETTLE + STEADY, timing)).isel(cycle=slice(SETTLE, None))
@@ -154,10 +154,10 @@ def _step(name: str, fitted: NoxProxy) -> tuple[dict[str, NDArray[np.float64]], 
     return quiet, noisy
 
 
-def _correction(seeds: int) -> NDArray[np.float64]:
+def _correction(n_seeds: int) -> NDArray[np.float64]:
     """Follow the corrected sensor from its wrong start, over seed and cycle: relative error of its ten-cycle mean."""
-    out = np.empty((seeds, SETTLE))
-    for seed in range(seeds):
+    out = np.empty((n_seeds, SETTLE))
+    for seed in range(n_seeds):
         run = VirtualEngine(soft_sensor=WRONG, seed=seed).run(np.full(SETTLE, -6.0))
         error = np.log((run["nox_soft_corrected_ppm"] / run["nox_true_ppm"]).to_numpy())
         out[seed] = np.convolve(error, np.full(10, 0.1))[:SETTLE]

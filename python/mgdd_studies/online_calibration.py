@@ -178,7 +178,7 @@ class Taught:
 
 
 def run_online_calibration(
-    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Calibrate the wall heat of a cycle model from twice the truth while an engine seeks its best timing.
 
@@ -190,7 +190,7 @@ def run_online_calibration(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of every case.
     quick : bool
         At most four seeds.
@@ -214,15 +214,15 @@ def run_online_calibration(
     Examples
     --------
     >>> from mgdd_studies.online_calibration import run_online_calibration
-    >>> result = run_online_calibration(seeds=2, quick=True, figures=False)
+    >>> result = run_online_calibration(n_seeds=2, quick=True, figures=False)
     >>> row = result.summary["rows"][0]
     >>> row["way"], row["sensor"], abs(row["error_percent"]) < 3.0
     ('Gauss-Newton', 'clean', True)
     """
-    seeds = check_seeds(seeds, quick=quick, most=4)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=4)
     work = Parts(progress)
     done = work(
-        (f"{way.name}, {sensor.name}", partial(teach, way, sensor, seeds))
+        (f"{way.name}, {sensor.name}", partial(teach, way, sensor, n_seeds))
         for sensor in (*NOISES, *ERRORS)
         for way in WAYS
     )
@@ -231,7 +231,7 @@ def run_online_calibration(
     rows = [row_of(taught) for taught in done]
     return work.finish(
         "online-calibration", _dataset(done), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=rows,
         facts=facts,
         bars=_bars(rows) + fact_bars(facts),
@@ -239,12 +239,12 @@ def run_online_calibration(
     )  # fmt: skip
 
 
-def teach(way: Way, sensor: Sensor, seeds: int) -> Taught:
+def teach(way: Way, sensor: Sensor, n_seeds: int) -> Taught:
     """Let a seeking engine teach its model, once per seed."""
-    scale, determined, stated = np.empty((seeds, CYCLES)), np.empty((seeds, CYCLES), bool), np.empty(seeds)
-    for seed in range(seeds):
+    scale, determined, stated = np.empty((n_seeds, CYCLES)), np.empty((n_seeds, CYCLES), bool), np.empty(n_seeds)
+    for seed in range(n_seeds):
         bench, calibration = sensor.bench(seed), way.calibration()
-        seeker = ExtremumSeeking(start=_START_CAD, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], gain=_GAIN)
+        seeker = ExtremumSeeking(start=_START_CAD, bounds=BOUNDS_CAD, gain=_GAIN)
         for k in range(CYCLES):
             point, asked = bench.point, float(seeker.ask()[0])
             cycle = bench.step(asked)

@@ -38,7 +38,7 @@ def available_studies() -> dict[str, str]:
 def run_study(
     name: str,
     *,
-    seeds: int | None = None,
+    n_seeds: int | None = None,
     quick: bool = False,
     figures: bool = True,
     executor: MakesExecutor | None = None,
@@ -52,7 +52,7 @@ def run_study(
     ----------
     name : str
         One of the names that ``mgdd study`` lists, ``sensor-delay`` for example.
-    seeds : int, optional
+    n_seeds : int, optional
         Number of seeds behind every statistic, >= 1; the study's own number if left out.
     quick : bool
         A shorter study with wider intervals.
@@ -84,7 +84,7 @@ def run_study(
     Examples
     --------
     >>> from mgdd_studies import run_study
-    >>> result = run_study("sensor-delay", seeds=2, quick=True, figures=False)
+    >>> result = run_study("sensor-delay", n_seeds=2, quick=True, figures=False)
     >>> [row["step_sign"] for row in result.summary["rows"]]
     [1, -1, -1, -1, 1, 1, 1]
     """
@@ -95,10 +95,10 @@ def run_study(
     options |= {"quick": quick, "figures": figures}
     if progress is not None:
         options["progress"] = progress
-    if seeds is not None:
-        if "seeds" not in taken:
-            raise ParameterError(f"seeds = {seeds}: study {name!r} is deterministic; leave them out")
-        options["seeds"] = check_seeds(seeds)
+    if n_seeds is not None:
+        if "n_seeds" not in taken:
+            raise ParameterError(f"n_seeds = {n_seeds}: study {name!r} is deterministic; leave them out")
+        options["n_seeds"] = check_seeds(n_seeds)
     if STUDIES[name].one_part and not (executor is None and workers is None):
         raise ParameterError(f"executor, workers: study {name!r} is one part, which they cannot share; leave them out")
     with parts_on(executor, workers):

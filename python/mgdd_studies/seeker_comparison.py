@@ -69,15 +69,15 @@ class Learned:
         }
 
 
-def learn(law: str, seeds: int, *, trials: int = 12, scatter_cad: float = 0.3) -> Learned:
+def learn(law: str, n_seeds: int, *, trials: int = 12, scatter_cad: float = 0.3) -> Learned:
     """Learn the commanded timing of the load step trial by trial; the scatter of combustion differs in every trial."""
     points = [(0, OperatingPoint(fuel_mg=LOW_MG)), (STEP_AT, OperatingPoint(fuel_mg=HIGH_MG))]
     bench = VirtualEngine(schedule=points, soc_scatter_cad=scatter_cad, efficiency_noise_percent=0.0)
-    errors = np.empty((seeds, trials))
+    errors = np.empty((n_seeds, trials))
     sigma_max = math.nan
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         learner = IterativeLearning(
-            np.full(_STEP_CYCLES, FIRST_SOC_CAD), impulse_response=_LAG, lower=-25.0, upper=8.0, **LAWS[law]
+            np.full(_STEP_CYCLES, FIRST_SOC_CAD), impulse_response=_LAG, bounds=(-25.0, 8.0), **LAWS[law]
         )
         sigma_max = learner.convergence().sigma_max
         for trial in range(trials):
@@ -107,7 +107,7 @@ class _Outcome:
 
 
 def run_seeker_comparison(
-    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare every seeker on the same engine, noise, start and budget of 2000 cycles.
 
@@ -118,7 +118,7 @@ def run_seeker_comparison(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of each seeker.
     quick : bool
         At most six seeds.
@@ -140,21 +140,21 @@ def run_seeker_comparison(
     Examples
     --------
     >>> from mgdd_studies.seeker_comparison import run_seeker_comparison
-    >>> result = run_seeker_comparison(seeds=2, quick=True, figures=False)
+    >>> result = run_seeker_comparison(n_seeds=2, quick=True, figures=False)
     >>> min(row["share_arrived"] for row in result.summary["rows"])
     1.0
     """
-    seeds = check_seeds(seeds, quick=quick, most=6)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=6)
     work = Parts(progress)
     best = VirtualEngine().find_optimum()
-    done = work((c.name, partial(_run, c, best, seeds)) for c in _contenders(best))
-    learned = work((f"iterative learning, {law}", partial(learn, law, min(seeds, 20))) for law in LAWS)
+    done = work((c.name, partial(_run, c, best, n_seeds)) for c in _contenders(best))
+    learned = work((f"iterative learning, {law}", partial(learn, law, min(n_seeds, 20))) for law in LAWS)
     return work.finish(
         "seeker-comparison", _dataset(done, learned, best), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[outcome.row for outcome in done],
         iterative_learning=[own.row() for own in learned],
-        iterative_learning_seeds=min(seeds, 20),
+        iterative_learning_seeds=min(n_seeds, 20),
         optimum_cad=best["soc_cad"],
         curvature_percent_per_cad2=best.curvature,
         start_cad=START_CAD,
@@ -163,7 +163,7 @@ def run_seeker_comparison(
 
 
 def _contenders(best: Optimum) -> list[_Contender]:
-    box: dict[str, Any] = {"start": START_CAD, "lower": BOUNDS_CAD[0], "upper": BOUNDS_CAD[1]}
+    box: dict[str, Any] = {"start": START_CAD, "bounds": BOUNDS_CAD}
     wish: dict[str, Any] = {"distance": best["soc_cad"] - START_CAD, "arrival": ARRIVAL_CAD}
     batch = tune(NOISE_PERCENT, best.curvature, method="batch", **wish)
     spsa = tune(NOISE_PERCENT, best.curvature, method="spsa", **wish)
@@ -194,10 +194,10 @@ def _short(tuning: Tuning) -> str:
     return f"amplitude {tuning.amplitude:.2f}, period {tuning.period}, gain {tuning.gain:.2f}"
 
 
-def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
+def _run(contender: _Contender, best: Optimum, n_seeds: int) -> _Outcome:
     seeker = contender.seeker
     table = loops(
-        VirtualEngine(), seeker, range(seeds), cycles=CYCLES,
+        VirtualEngine(), seeker, range(n_seeds), cycles=CYCLES,
         criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD),
     )  # fmt: skip
 
@@ -214,7 +214,7 @@ def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
         **with_interval("final_cad", table["final_soc_cad"]),
         **with_interval("j_lost", best.value - table["mean_j"]),
     }
-    return _Outcome(row=row, runs=estimates(make, range(min(seeds, _BAND_SEEDS)), _SHOWN), table=table)
+    return _Outcome(row=row, runs=estimates(make, range(min(n_seeds, _BAND_SEEDS)), _SHOWN), table=table)
 
 
 def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum) -> xr.Dataset:
@@ -233,7 +233,7 @@ def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum
         "cycles_to": (own, by_seed("cycles_to"), "-", "first cycle within 1 °CA of the optimum"),
         "rms_cad": (own, by_seed("rms_soc_cad"), "°CA", "rms error of the estimate, second half"),
         "final_cad": (own, by_seed("final_soc_cad"), cad, "mean estimate of the last 100 cycles"),
-        "mean_j": (own, by_seed("mean_j"), "%", "mean J, second half"),
+        "mean_j": (own, by_seed("mean_j"), "%", "mean efficiency, second half"),
         "optimum_cad": ((), best["soc_cad"], cad, "optimum"),
     }
     if learned:

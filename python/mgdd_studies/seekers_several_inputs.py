@@ -38,7 +38,7 @@ Make = Callable[[maps.SeekingMap, Any, int], Seeker]  # map, start, seed
 def _process(guide: Callable[[maps.SeekingMap, int], Any] | None) -> Make:
     def make(field: maps.SeekingMap, start: Any, seed: int) -> Seeker:
         given = None if guide is None else guide(field, seed)
-        return GaussianProcessSeeking(start=start, lower=field.lower, upper=field.upper, guide=given)
+        return GaussianProcessSeeking(start=start, bounds=(field.lower, field.upper), guide=given)
 
     return make
 
@@ -97,7 +97,7 @@ class _Path:
 
 
 def run_seekers_several_inputs(
-    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare seekers of two and three inputs of unlike units, and of timing, EGR and boost under two limits.
 
@@ -113,7 +113,7 @@ def run_seekers_several_inputs(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs per seeker and map, and per seeker on the bench.
     quick : bool
         At most six seeds, and 120 instead of 300 cycles on the maps.
@@ -133,26 +133,26 @@ def run_seekers_several_inputs(
     Examples
     --------
     >>> from mgdd_studies.seekers_several_inputs import run_seekers_several_inputs
-    >>> rows = run_seekers_several_inputs(seeds=2, quick=True, figures=False).summary["rows"]
+    >>> rows = run_seekers_several_inputs(n_seeds=2, quick=True, figures=False).summary["rows"]
     >>> lost = {row["seeker"]: row["j_lost"] for row in rows if row["map"] == "coupled"}
     >>> 2.0 * lost["Gaussian process"] < lost["SPSA by tune"]
     True
     """
-    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=_QUICK_SEEDS)
     cycles = _QUICK_CYCLES if quick else maps.CYCLES
     work = Parts(progress)
     best = three.bench_optimum()
     done = work(
-        (f"{field.name}, {seeker}", partial(_on_map, field.name, seeker, seeds, cycles))
+        (f"{field.name}, {seeker}", partial(_on_map, field.name, seeker, n_seeds, cycles))
         for field in maps.several_maps()
         for seeker in _ON_MAPS
     )
     paths = work((f"path, {seeker}", partial(_path, seeker)) for seeker in (PLAIN, OFF, TUNED_SPSA, TUNED_DITHER))
-    bench = work((f"bench, {seeker}", partial(three.on_bench, seeker, seeds, best)) for seeker in three.SEEKERS)
+    bench = work((f"bench, {seeker}", partial(three.on_bench, seeker, n_seeds, best)) for seeker in three.SEEKERS)
     rows, bench_rows = [own.row() for own in done], [own.row() for own in bench]
     return work.finish(
         "seekers-several-inputs", _dataset(done, paths, bench), draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         cycles=cycles,
         rows=rows,
         bench=bench_rows,
@@ -165,10 +165,10 @@ def _field(name: str) -> maps.SeekingMap:
     return next(field for field in maps.several_maps() if field.name == name)
 
 
-def _on_map(name: str, seeker: str, seeds: int, cycles: int) -> _Runs:
+def _on_map(name: str, seeker: str, n_seeds: int, cycles: int) -> _Runs:
     field = _field(name)
-    lost, estimate_lost = np.empty((2, seeds, cycles))
-    for seed in range(seeds):
+    lost, estimate_lost = np.empty((2, n_seeds, cycles))
+    for seed in range(n_seeds):
         setting = field.setting(seed, True)
         own = _ON_MAPS[seeker](field, setting.start, seed)
         for cycle in range(cycles):
@@ -209,11 +209,11 @@ def _bars(rows: Sequence[dict[str, Any]], bench: Sequence[dict[str, Any]]) -> li
         ("no guide: readings until near, median [cycles]", [row["cycles_to_near"] for row in plain], 15.0),
         ("no guide: runs that never are near [%]", [row["never_near_percent"] for row in plain], 5.0),
         ("no guide: runs whose last estimate is not near [%]", [row["away_at_end_percent"] for row in plain], 5.0),
-        ("no guide: J lost over that of the better tuned dither [-]", over(PLAIN, TUNED_SPSA, TUNED_DITHER), 0.5),
-        ("guide bent by half: J lost over that without a guide [-]", over(BENT, PLAIN), 0.9),
-        ("guide off by a fifth: J lost over that without a guide [-]", over(OFF, PLAIN), 1.05),
-        ("guide of no use: J lost over that without a guide [-]", over(USELESS, PLAIN), 1.1),
-        ("bench: J lost by the estimate after 40 cycles [points]", [row["j_lost_after_40"] for row in known], 0.1),
+        ("no guide: loss over that of the better tuned dither [-]", over(PLAIN, TUNED_SPSA, TUNED_DITHER), 0.5),
+        ("guide bent by half: loss over that without a guide [-]", over(BENT, PLAIN), 0.9),
+        ("guide off by a fifth: loss over that without a guide [-]", over(OFF, PLAIN), 1.05),
+        ("guide of no use: loss over that without a guide [-]", over(USELESS, PLAIN), 1.1),
+        ("bench: loss of the estimate after 40 cycles [points]", [row["j_lost_after_40"] for row in known], 0.1),
         ("bench: cycles truly above a limit [%]", [row["above_percent"] for row in known], 1.0),
         ("bench: worst value above a limit [%]", [row["worst_percent"] for row in known], 10.0),
     ])  # fmt: skip
@@ -229,14 +229,19 @@ def _dataset(done: Sequence[_Runs], paths: Sequence[_Path], bench: Sequence[thre
         "seed": ("seed", np.arange(done[0].lost.shape[0]), "-", "seed"),
         "cycle": ("cycle", np.arange(done[0].lost.shape[1])),
         **{
-            f"j_lost{end}": ("case", [row[f"j_lost{end}"] for row in rows], points, f"J lost per cycle{text}")
+            f"j_lost{end}": (
+                "case",
+                [row[f"j_lost{end}"] for row in rows],
+                points,
+                f"loss of the objective per cycle{text}",
+            )
             for end, text in (("", ""), ("_low", ", low end of the interval"), ("_high", ", high end of the interval"))
         },
         "mean_j_lost": (
             ("case", "cycle"),
             [own.lost.mean(axis=0) for own in done],
             points,
-            "J lost, mean of the seeds",
+            "loss of the objective, mean of the seeds",
         ),
     }
     return labelled_dataset(variables | _path_variables(paths) | three.bench_variables(bench))
@@ -256,7 +261,7 @@ def _path_variables(paths: Sequence[_Path]) -> dict[str, tuple[Any, ...]]:
         "path_cycle": ("path_cycle", np.arange(_SHOWN_CYCLES), "-", "engine cycle"),
         "map_soc_cad": ("map_soc_cad", soc, cad, "timing"),
         "map_egr": ("map_egr", egr, "-", "EGR rate"),
-        "map_j_lost": (("map_soc_cad", "map_egr"), lost, "points", "J lost, without noise"),
+        "map_j_lost": (("map_soc_cad", "map_egr"), lost, "points", "loss of the objective, without noise"),
         **{f"{name}_soc_cad": (over, [one[:, 0] for one in own], cad, f"timing, {name}") for name, own in each.items()},
         **{f"{name}_egr": (over, [one[:, 1] for one in own], "-", f"EGR rate, {name}") for name, own in each.items()},
     }

@@ -1,4 +1,4 @@
-"""Figures of the study `seekers-several-inputs`: J lost by map, paths in the plane, limits on the bench."""
+"""Figures of the study `seekers-several-inputs`: loss by map, paths in the plane, limits on the bench."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _LEVELS = (0.06, 0.3, 1.0, 3.0, 10.0, 30.0)
 
 
 _SAID = {
-    "j_lost": "J lost per cycle by what was applied, without its noise: mean over seeds with its 95 % interval",
+    "j_lost": "Loss per cycle by what was applied, without its noise: mean over seeds with its 95 % interval",
     "path": (
-        "One run on the coupled map: inputs applied in the first cycles, and the estimate; contours of J lost "
-        "[points], the innermost what counts as near"
+        "One run on the coupled map: inputs applied in the first cycles, and the estimate; contours of the "
+        "loss [points], the innermost what counts as near"
     ),
     "bench_seeker": (
         "Limits on the bench by what was applied, without noise: medians of the seeds, and the band that holds 80 % of "
@@ -51,7 +51,7 @@ def _losses(dataset: xr.Dataset) -> Figure:
         ends = np.nan_to_num([middle - own["j_lost_low"], own["j_lost_high"] - middle])
         ax.errorbar(x, middle, yerr=ends, fmt=mark, color=color, capsize=3, markersize=5, label=name)
     ax.set_xticks(range(len(places)), places)
-    ax.set(xlabel="map", ylabel="J lost per cycle [points]", yscale="log")
+    ax.set(xlabel="map", ylabel="loss of the objective per cycle [points]", yscale="log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.minorticks_off()

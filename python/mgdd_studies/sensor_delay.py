@@ -57,7 +57,7 @@ CASES = (
 
 
 def run_sensor_delay(
-    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Show why the delay of an analyser defeats extremum seeking of efficiency and NOx, and what helps.
 
@@ -68,7 +68,7 @@ def run_sensor_delay(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs behind each rms of the component-wise seekers.
     quick : bool
         At most four seeds.
@@ -88,22 +88,22 @@ def run_sensor_delay(
     Examples
     --------
     >>> from mgdd_studies.sensor_delay import run_sensor_delay
-    >>> rows = run_sensor_delay(seeds=2, quick=True, figures=False).summary["rows"]
+    >>> rows = run_sensor_delay(n_seeds=2, quick=True, figures=False).summary["rows"]
     >>> rows[0]["cycles_stays"], rows[1]["cycles_stays"]
     (72, None)
     """
-    seeds = check_seeds(seeds, quick=quick, most=4)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=4)
     work = Parts(progress)
     performance = Performance.efficiency_and_nox()
     best = VirtualEngine(**_QUIET, performance=performance, nox_sensor="true_value").find_optimum()
     done = work((f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES)
     found = work(
-        (f"component by component, period {period}", partial(_component_wise, period, time, best, seeds))
+        (f"component by component, period {period}", partial(_component_wise, period, time, best, n_seeds))
         for period, time in ((10, 40.0), (60, 240.0))
     )
     return work.finish(
         "sensor-delay", _dataset(done, found, best), _draw if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[row for row, _, _ in done],
         component_wise=[row for row, _ in found],
         frozen_slope_percent_per_cad=[slope for _, slope, _ in done],
@@ -156,7 +156,7 @@ def _seeker(
     hold_cycles: int | None = None,
 ) -> ExtremumSeeking:  # fmt: skip
     return ExtremumSeeking(
-        start=best["soc_cad"] - early_cad, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], form="moving_average",
+        start=best["soc_cad"] - early_cad, bounds=BOUNDS_CAD, form="moving_average",
         period=period, gain=approach_gain(best.curvature, time_constant), rate=math.inf, components=components,
         hold_cycles=hold_cycles,
     )  # fmt: skip
@@ -173,7 +173,7 @@ def _frozen_slope(bench: VirtualEngine, seeker: ExtremumSeeking, settle: int, pe
 
 
 def _component_wise(
-    period: int, time_constant: float, best: Optimum, seeds: int
+    period: int, time_constant: float, best: Optimum, n_seeds: int
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """Give the row of a seeker that demodulates efficiency at once and NOx with the analyser's phase, and its runs."""
     sensor = SensorDynamics(
@@ -186,7 +186,7 @@ def _component_wise(
         )
         return bench, _seeker(best, period, time_constant, components=[ComponentLag(), _ANALYSER])
 
-    table = loops(*make(0), range(seeds), cycles=CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"]))
+    table = loops(*make(0), range(n_seeds), cycles=CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"]))
     row = {
         "case": "analyser, NOx demodulated with its own phase",
         "period_cycles": period,
@@ -195,7 +195,7 @@ def _component_wise(
         "rms_cad": rms(table["rms_soc_cad"]),
         **with_interval("final_cad", table["mean_soc_cad"]),
     }
-    return row, estimates(make, range(min(seeds, 20)), CYCLES)
+    return row, estimates(make, range(min(n_seeds, 20)), CYCLES)
 
 
 def _dataset(
@@ -212,7 +212,12 @@ def _dataset(
         "estimate_median_cad": (("case", "cycle"), [track for _, _, track in done], cad, "estimate of the best timing"),
         "phase_deg": ("case", [row["phase_deg"] for row, _, _ in done], "deg", "phase lag of delay and lag"),
         "step_sign": ("case", [row["step_sign"] for row, _, _ in done], "-", "sign of the averaged step, 1: right way"),
-        "frozen_slope": ("case", [slope for _, slope, _ in done], "%/°CA", "demodulated slope of J, estimate frozen"),
+        "frozen_slope": (
+            "case",
+            [slope for _, slope, _ in done],
+            "%/°CA",
+            "demodulated slope of the objective, estimate frozen",
+        ),
         "cycles_stays": ("case", stays, "-", "cycle from which the estimate stays"),
         "final_cad": ("case", [row["final_cad"] for row, _, _ in done], cad, "mean estimate of the last cycles"),
         "optimum_cad": ((), best["soc_cad"], cad, "optimum"),

@@ -138,4 +138,4 @@ def tuned_seeker(field: SeekingMap, start: Point, seed: int, method: str, curvat
     found = tune(field.noise_sd, curvature, method=method)
     if np.any(found.amplitude > room):
         found = tune(field.noise_sd, curvature, method=method, amplitude_max=np.minimum(found.amplitude, room))
-    return found.seeker(start=start, lower=field.lower, upper=field.upper, seed=seed)
+    return found.seeker(start=start, bounds=(field.lower, field.upper), seed=seed)

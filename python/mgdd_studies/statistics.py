@@ -202,5 +202,5 @@ def run_with_slope(bench: VirtualEngine, seeker: Any, cycles: int) -> xr.Dataset
     settings = listener.settings
     period = 1 if settings.get("form") == "batch" else int(settings["period"])  # a batch is such a mean itself
     mean = np.convolve(slope, np.full(period, 1.0 / period))[:cycles]
-    attrs = unit_attributes("%/°CA", "estimated slope of J")
+    attrs = unit_attributes("%/°CA", "estimated slope of the objective")
     return run.assign(gradient_per_cad=("cycle", mean, attrs))

@@ -115,11 +115,11 @@ class OnBench:
         }
 
 
-def on_bench(seeker: str, seeds: int, best: Optimum) -> OnBench:
+def on_bench(seeker: str, n_seeds: int, best: Optimum) -> OnBench:
     """Run a seeker on the bench for each seed."""
     guides = _model(limits=seeker == LIMITS_TOO) if seeker in (GUIDED, LIMITS_TOO) else {}
     runs = []
-    for seed in range(seeds):
+    for seed in range(n_seeds):
         bench = noisy_bench(seed)
         own = _bench_seeker(seeker, told(bench), seed, guides)
         runs.append(bench_run(bench, own, UNTIL, best.value))

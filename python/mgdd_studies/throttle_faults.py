@@ -188,7 +188,7 @@ SHOWN = ("sensors disagree", "jammed in flight")
 
 
 def run_throttle_faults(
-    *, seeds: int = 3, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 3, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Run every labelled fault against PID and sliding mode on every preset, watched by a supervisor.
 
@@ -197,7 +197,7 @@ def run_throttle_faults(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Noise realisations; the rows hold the worst of them.
     quick : bool
         Preset P1 and one seed only.
@@ -223,7 +223,7 @@ def run_throttle_faults(
     >>> max(row["safe_ms"] for row in rows) <= 50.0, all(row["recovered"] for row in rows)
     (True, True)
     """
-    n_seeds = 1 if quick else check_seeds(seeds)
+    n_seeds = 1 if quick else check_seeds(n_seeds)
     names = presets.available("throttle")[: 1 if quick else None]
     chosen = [b for b in baselines().values() if b.preset in names]
     work = Parts(progress)

@@ -221,7 +221,7 @@ _KEPT = ("settling_ms", "mse_deg2", "static_error_deg", "overshoot_deg", "total_
 
 
 def run_throttle_tracking(
-    *, seeds: int = 100, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 100, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare the model-guided controller with its baselines on throttles drawn around the presets.
 
@@ -232,7 +232,7 @@ def run_throttle_tracking(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Throttles per preset, and noise seeds.
     quick : bool
         Four throttles around P1, the first case only.
@@ -255,11 +255,11 @@ def run_throttle_tracking(
     Examples
     --------
     >>> from mgdd_studies import run_study
-    >>> rows = run_study("throttle-tracking", seeds=3, quick=True, figures=False).summary["rows"]
+    >>> rows = run_study("throttle-tracking", n_seeds=3, quick=True, figures=False).summary["rows"]
     >>> [row["controller"] for row in rows][:2]
     ['guided', 'mgdd1']
     """
-    n = check_seeds(seeds, quick=quick, most=4)
+    n = check_seeds(n_seeds, quick=quick, most=4)
     work = Parts(progress)
     jobs = [(name, preset) for name, case in CASES.items() for preset in case.presets]
     if quick:

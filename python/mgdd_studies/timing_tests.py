@@ -52,7 +52,7 @@ class _Test:
     def seeker(self, best: Optimum, *, limited: bool = False) -> ExtremumSeeking:
         late = self.nox_sensor == "analyser"
         return ExtremumSeeking(
-            start=self.start_cad, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], period=self.period,
+            start=self.start_cad, bounds=BOUNDS_CAD, period=self.period,
             gain=approach_gain(best.curvature, self.time_constant), rate=_LATE_RATE if late else None,
             components=[ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25)] if late else None,
             limits=[Limit("p_max_bar", P_MAX_BAR)] if limited else [],
@@ -77,7 +77,7 @@ class _Outcome:
 
 
 def run_timing_tests(
-    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Run four tests of extremum seeking as an engine test cell would, each over many seeds.
 
@@ -88,7 +88,7 @@ def run_timing_tests(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Runs of each test, of 3000 cycles.
     quick : bool
         At most ten seeds.
@@ -111,17 +111,17 @@ def run_timing_tests(
     Examples
     --------
     >>> from mgdd_studies.timing_tests import run_timing_tests
-    >>> rows = run_timing_tests(seeds=2, quick=True, figures=False).summary["rows"]
+    >>> rows = run_timing_tests(n_seeds=2, quick=True, figures=False).summary["rows"]
     >>> [row["gain_percent_points"] > 0.0 for row in rows]
     [True, True, True, True]
     """
-    seeds = check_seeds(seeds, quick=quick, most=10)
+    n_seeds = check_seeds(n_seeds, quick=quick, most=10)
     work = Parts(progress)
-    done = work((f"test {t.name}", partial(_run, t, seeds)) for t in TESTS)
-    limited = work([("test 1 under a pressure limit", partial(_run, TESTS[0], seeds, limited=True))])
+    done = work((f"test {t.name}", partial(_run, t, n_seeds)) for t in TESTS)
+    limited = work([("test 1 under a pressure limit", partial(_run, TESTS[0], n_seeds, limited=True))])
     return work.finish(
         "timing-tests", _dataset(done), (lambda _: _draw(done, limited)) if figures else None,
-        seeds=seeds,
+        seeds=n_seeds,
         rows=[outcome.row for outcome in done],
         limited=[outcome.row for outcome in limited],
         nox_weight_percent_per_ppm=NOX_WEIGHT,
@@ -130,14 +130,14 @@ def run_timing_tests(
     )  # fmt: skip
 
 
-def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
+def _run(test: _Test, n_seeds: int, *, limited: bool = False) -> _Outcome:
     bench = test.bench(limited=limited)
     caps = {"p_max_bar": P_MAX_BAR} if limited else {}
     best = bench.find_optimum(caps)
     seeker = test.seeker(best, limited=limited)
     above = {name: cap + 3.0 * best[f"scatter_{name}"] for name, cap in caps.items()}
     table = loops(
-        bench, seeker, range(seeds), cycles=CYCLES,
+        bench, seeker, range(n_seeds), cycles=CYCLES,
         criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD, tail_cycles=TAIL, exceed_above=above),
     )  # fmt: skip
     before = bench.steady_map([test.start_cad])
@@ -196,7 +196,7 @@ def _dataset(done: Sequence[_Outcome]) -> xr.Dataset:
             "soc_requested_cad": (cycles, [run[:, 0] for run in track("asked")]),
             "j": (cycles, track("j")),
             "nox_true_ppm": (cycles, track("nox_true_ppm")),
-            "gradient_per_cad": (cycles, track("gradient_per_cad"), "%/°CA", "estimated slope of J"),
+            "gradient_per_cad": (cycles, track("gradient_per_cad"), "%/°CA", "estimated slope of the objective"),
         }
     )
 

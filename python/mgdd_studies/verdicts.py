@@ -44,8 +44,8 @@ _SAID: Mapping[str, tuple[_Range | _Share, ...]] = {
         _Range("loss of efficiency at the end", "j_lost", ("seeker",), "percentage points"),
     ),
     "seekers-several-inputs": (
-        _Range("J lost per cycle on the maps", "j_lost", ("seeker", "map"), "points"),
-        _Range("J lost by the estimate after 40 cycles of the bench", "j_lost_after_40", ("seeker",), "points",
+        _Range("loss of the objective per cycle on the maps", "j_lost", ("seeker", "map"), "points"),
+        _Range("loss by the estimate after 40 cycles of the bench", "j_lost_after_40", ("seeker",), "points",
                rows="bench"),
         _Range("cycles of the bench truly above a limit", "above_percent", ("seeker",), "%", rows="bench"),
     ),
@@ -107,7 +107,7 @@ _SAID: Mapping[str, tuple[_Range | _Share, ...]] = {
     ),
     "guided": (
         _Range(_CYCLES, "cycles_to_1_cad", ("case",)),
-        _Range("J lost at the start, times cycles", "lost_j_cycles", ("case",)),
+        _Range("loss at the start, times cycles", "lost_j_cycles", ("case",)),
     ),
     "measured-engine-seek": (
         _Range("final error of the timing", "error_cad", ("objective", "seeker"), "°CA"),

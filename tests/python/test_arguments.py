@@ -1,16 +1,21 @@
-"""Arguments of the wrong kind: the error names the argument, what was given and the remedy, whoever checks it."""
+"""Arguments of the wrong kind are named with the remedy; arrays are taken in every form of `numpy.asarray`."""
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pint
 import pytest
+import xarray as xr
 
+import mgdd
+from array_calls import CALLS, MORE, Array
 from mgdd import _core, presets
 from mgdd._arguments import refusal
 from mgdd.engine import (
@@ -30,7 +35,7 @@ from mgdd.optimize import ExtremumSeeking, Limit, Spsa
 from mgdd.throttle import SensorPair, Throttle
 
 PRESET = presets.load("puma_single")
-SEEKER = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+SEEKER = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 LEAK = re.compile(r"incompatible (function|constructor) arguments|Unable to cast|instance has no|pybind11")
 
 
@@ -99,7 +104,7 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: ExtremumSeeking(start=0.0, period="x"), "period", "period = 'x': must be a whole number"),
         (lambda: ExtremumSeeking(start="x"), "start", "start = 'x': must be"),
         (lambda: Spsa(start=0.0, limits=[3.0]), "limits", r"limits = \[3.0\], a list: must be a sequence of Limits"),
-        (lambda: VirtualEngine([Cylinder()]), "engine", "engine = .*: must be a Cylinder"),
+        (lambda: VirtualEngine([Cylinder()]), "cylinder", "cylinder = .*: must be a Cylinder"),
         (lambda: VirtualEngine(point=[OperatingPoint()]), None, "OperatingPoint"),
         (lambda: VirtualEngine().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
         (lambda: VirtualEngine().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),
@@ -166,9 +171,66 @@ def test_numbers_that_carry_a_unit_are_refused_and_not_read_as_radians(soc: str)
     with pytest.raises(ParameterError, match=r"magnitude"):
         find_optimum(PRESET.cylinder, PRESET.point, bounds_cad=(-20 * quantity.degree, 5 * quantity.degree))
     with pytest.raises(ParameterError, match=r"start = .*magnitude"):
-        ExtremumSeeking(start=given, lower=-30.0, upper=10.0)
+        ExtremumSeeking(start=given, bounds=(-30.0, 10.0))
     with pytest.raises(ParameterError, match=r"limp_home_deg = .*magnitude"):
         Throttle(limp_home_deg=7 * quantity.degree)
     curve = Curve.parabola(curvature=-0.05, best=3.0, reach=60.0)
     with pytest.raises(ParameterError, match=r"inputs = .*magnitude"):
         curve(given)
+
+
+def strided(values: Array) -> Array:
+    out = np.repeat(values, 2)[::2]
+    out.flags.writeable = False
+    return out
+
+
+def unaligned(values: Array) -> Array:
+    """Begin at an odd byte, as an array over a buffer that another process sent."""
+    out = np.frombuffer(b"\0" + values.tobytes(), values.dtype, offset=1)
+    assert not out.flags.aligned
+    return out
+
+
+FORMS: dict[str, Callable[[Array], Any]] = {
+    "list": lambda values: values.tolist(),
+    "tuple": lambda values: tuple(values.tolist()),
+    "series": lambda values: pd.Series(values, index=np.arange(values.size) + 1000),
+    "dataarray": lambda values: xr.DataArray(values, dims="sample", coords={"sample": np.arange(values.size) + 1000}),
+    "read-only strided": strided,
+    "unaligned": unaligned,
+    "scalars of numpy": list,
+}
+
+
+def takers() -> Iterable[str]:
+    """Public functions and methods that say ArrayLike, protocols and constructors of results left out."""
+    for module in mgdd.__all__:
+        room = importlib.import_module(f"mgdd.{module}") if module != "__version__" else None
+        for name in getattr(room, "__all__", ()):
+            thing = getattr(room, name)
+            members = vars(thing).items() if inspect.isclass(thing) else [("", thing)]
+            for key, member in members:
+                function = getattr(member, "__func__", member)
+                annotations = getattr(function, "__annotations__", {}) if callable(function) else {}
+                if any("ArrayLike" in str(note) for what, note in annotations.items() if what != "return"):
+                    yield f"{module}.{name}.{key}".rstrip(".")
+
+
+def test_every_taker_of_arrays_is_here() -> None:
+    found = {name for name in takers() if not name.startswith("results.FitReport.")}
+    assert set(CALLS) == found
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", [*CALLS, *MORE])
+def test_every_form_gives_the_same_numbers(name: str, form: str) -> None:
+    call, arrays = (CALLS | MORE)[name]
+    before = [values.copy() for values in arrays]
+    expected = call(*arrays)
+    given = [FORMS[form](values) for values in arrays]
+    found = call(*given)
+    np.testing.assert_equal(found, expected)
+    for values, copy, own in zip(arrays, before, given, strict=True):
+        np.testing.assert_array_equal(values, copy)
+        np.testing.assert_array_equal(np.asarray(own), copy)

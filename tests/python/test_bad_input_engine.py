@@ -178,6 +178,32 @@ def test_traces_that_cannot_be_what_they_say(spoil, match):
     np.testing.assert_array_equal(pressure, before[1])
 
 
+BOUNDS: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {  # what lies inside, and what is refused
+    **dict.fromkeys(("pegging_exponent", "gamma"), ((1.01, 1.69), (1.0, 1.7, math.nan))),
+    **dict.fromkeys(("gamma_compression", "gamma_combustion"), ((1.01, 1.69), (1.0, 1.7))),
+    "heat_from_cad": ((19.9, -140.0), (20.0, 21.0, math.nan)),
+    "earliest_burn_cad": ((-180.0, 90.0), (-180.1, 90.1, math.nan)),
+    "smoothing_width_cad": ((0.01, 30.0), (0.0, 30.1, math.nan)),
+    "smoothing_cutoff_hz": ((0.1, 1e6), (0.0, 1.1e6, math.nan)),
+    "intake_pressure_kpa": ((0.1, 2000.0), (0.0, 2001.0, math.nan)),
+    "bmep_bar": ((0.0, 5.0), (-0.1, 100.1, math.nan)),
+    "inlet_pressure_kpa": ((0.1, 300.0), (0.0, -1.0, math.nan)),
+}
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_options_of_an_analysis_have_their_bounds(name):
+    more = {"heat_from_cad": {"heat_to_cad": 20.0}, "inlet_pressure_kpa": {"pegging": "inlet"}}.get(name, {})
+    for inside, values in zip((True, False), BOUNDS[name], strict=True):
+        for value in values:
+            options, field = _core.engine.TraceOptions(**{name: value}, **more), ""
+            try:
+                _core.engine.analyze(*good_trace(), CYLINDER, POINT, options)
+            except Error as error:
+                field = error.field
+            assert (field != name) == inside, value
+
+
 def test_a_dataset_without_pressure_is_refused():
     cycle = simulate(CYLINDER, POINT)
     for call in (lambda t: analyze(t, CYLINDER), lambda t: fit_cylinder([t], CYLINDER)):

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from mgdd.errors import Error
 from mgdd.guide import Curve
 from mgdd.loop import VirtualEngine, VirtualThrottle, monte_carlo
-from mgdd.optimize import GaussianProcessSeeking, Limit, Spsa
+from mgdd.optimize import GaussianProcessSeeking, Input, Limit, Spsa
 from mgdd.rig import GatedThrottle
 from public_objects import bound_classes, public_objects, saved_state
 
@@ -77,6 +78,24 @@ def test_what_each_protocol_can_do_is_the_same() -> None:
         assert able != list(range(2, pickle.HIGHEST_PROTOCOL + 1)) or hasattr(type(thing), "__slots__"), name
 
 
+def test_every_number_of_a_setting_is_refused_by_its_name() -> None:
+    """Of every class of the core whose settings make it again."""
+    refused = 0
+    for cls in bound_classes().values():
+        thing = next((each for each in public_objects().values() if type(each) is cls), None)
+        settings = getattr(thing, "settings", None) or attempt(lambda thing=thing: thing.to_dict())
+        if not isinstance(settings, dict) or isinstance(attempt(lambda s=settings, c=cls: c(**s)), REFUSED):
+            continue
+        assert not hasattr(cls, "fields") or set(cls.fields()) == set(settings)
+        for name in (name for name, value in settings.items() if type(value) in (int, float)):
+            with pytest.raises(Error) as caught:
+                cls(**{**settings, name: float("nan")})
+            assert caught.value.bound
+            assert caught.value.field.endswith(name) or cls is Input, (cls, name)  # which names both of its bounds
+            refused += 1
+    assert refused > 200
+
+
 @pytest.mark.parametrize("way", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x, 0))])
 def test_a_throttle_goes_on_bit_for_bit_in_a_copy(way: Any) -> None:
     plain = VirtualThrottle(inputs=("duty", "bridge_open"), start_deg=20.0, step_s=5e-5, seed=3)
@@ -111,7 +130,7 @@ def test_object_that_was_never_made_is_a_type_error(name: str) -> None:
 def test_object_that_was_never_made_is_no_argument_either() -> None:
     limit = Limit.__new__(Limit)
     with pytest.raises(TypeError, match="never made"):
-        Spsa(start=0.0, lower=-1.0, upper=1.0, limits=[limit])
+        Spsa(start=0.0, bounds=(-1.0, 1.0), limits=[limit])
     with pytest.raises(TypeError, match="never made"):
         assert limit != Limit("p_max_bar", upper=90.0)
 
@@ -125,7 +144,7 @@ def test_frame_of_a_constructor_that_raised_can_be_shown() -> None:
             super().__init__(**keywords)
 
     with pytest.raises(Exception, match="lower"):
-        Kept(start=0.0, lower=1.0, upper=-1.0)
+        Kept(start=0.0, bounds=(1.0, -1.0))
     with pytest.raises(TypeError, match="never made"):
         repr(held[0])
 
@@ -141,7 +160,7 @@ def test_curve_is_not_read_where_nothing_is(value: Any) -> None:
 def test_only_the_seed_of_the_run_counts(seeker: Any, misfires: float) -> None:
     ends = []
     for made in (0, 5):
-        start = seeker(start=-2.0, lower=-20.0, upper=10.0, seed=made)
+        start = seeker(start=-2.0, bounds=(-20.0, 10.0), seed=made)
         run = monte_carlo(VirtualEngine(misfire_probability=misfires), [start], [5], cycles=120)
         ends.append(float(np.ravel(run["final_soc_cad"].values)[0]))
     assert ends[0] == ends[1]

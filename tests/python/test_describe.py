@@ -16,9 +16,8 @@ from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
 from mgdd.guide import FeedForward, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify import OdeModel, check_excitation, fit_cylinder, validate_throttle
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.loop import SensorDynamics, SurrogatePlant, VirtualEngine, run_seeker
 from mgdd.maps import CalibrationMap
@@ -29,7 +28,7 @@ from mgdd.results.units import unit_of
 from mgdd.signals import chirp
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
-from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate_throttle
+from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, simulate_throttle
 from mgdd_studies.benchmarks.drive_axis import DriveModel
 from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
 
@@ -43,8 +42,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
-    example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
-    seeking = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+    seeking = {"start": -20.0, "bounds": (-30.0, 10.0)}
     return {
         "engine preset": lambda: presets.load("puma_single"),
         "throttle preset": lambda: presets.load("P1"),
@@ -74,7 +72,6 @@ def objects() -> dict[str, Callable[[], Any]]:
         "pw_r": lambda: PseudoWiener("pw_r"),
         "pw_p": lambda: PseudoWiener("pw_p", {"plays": 8.0}),
         "first principle": FirstPrincipleModel,
-        "smooth": lambda: SmoothThrottle(parameters=example),
         "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, initial_state=(0.0,)),
         "drive": lambda: DriveModel(parameters={"mass_kg": 95.0}, force_n_per_v=35.0),
         "filter": lambda: LinearApproximation(
@@ -86,8 +83,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
         "best": lambda: surrogate().find_optimum("imep_bar"),
         "surrogate engine": lambda: SurrogatePlant(surrogate()),
-        "fit": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)),
-        "report": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)).report,
+        "fit": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)),
+        "report": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(
@@ -133,22 +130,6 @@ def test_units_are_there() -> None:
     assert markup.count("<tr>") == len(Throttle.fields())
     assert "bore_mm 86 mm" in repr(presets.load("puma_single"))
     assert "% of p_max" in repr(objects()["calibration"]())
-
-
-def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
-    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), SensorDynamics(), Cylinder(bore_mm=90.0)):
-        assert max(map(len, repr(record).splitlines())) <= 100
-    names = {
-        "SensorPair": SensorPair,
-        "NoxModel": _core.engine.NoxModel,
-        "NoxProxy": _core.engine.NoxProxy,
-        "SoftSensor": SoftSensor,
-        "DemandChain": DemandChain,
-        "PedalMap": PedalMap,
-    }
-    chain = DemandChain(bore_mm=52.0, pedal_map=PedalMap.of_full_load([900.0, 5000.0], [150.0, 130.0]))
-    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), chain, chain.pedal_map):
-        assert eval(repr(record), names) == record
 
 
 def test_many_and_long_rows_are_counted_and_cut() -> None:

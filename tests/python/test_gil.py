@@ -34,7 +34,7 @@ def batch(make: Callable[[], Call]) -> Callable[[], Call]:
 
 
 def seeker() -> ExtremumSeeking:
-    return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    return ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 
 
 def pseudo_wiener() -> Any:
@@ -218,15 +218,6 @@ def air_torque() -> Call:
 def sensors() -> Call:
     angle, faults = np.full(SOME, 10.0), [("none", 0.0, 0.0, None)] * 2
     return partial(_core.throttle.sense, _core.throttle.SensorPair(), angle, sample_s=1e-3, seed=1, faults=faults)
-
-
-@batch
-def smooth_throttle() -> Call:
-    constants = {"inertia_kgm2": 0.002, "gear_ratio": 20.0, "inductance_h": 1e-3, "supply_v": 12.0}
-    values = list(_core.identify.smooth_example)
-    return partial(
-        _core.identify.simulate_smooth_throttle, values, DUTY, step_s=1e-3, start=[0.1, 0.0, 0.0], **constants
-    )
 
 
 @batch

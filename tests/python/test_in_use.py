@@ -24,7 +24,7 @@ from mgdd.optimize import (
 )
 from mgdd.throttle import PseudoWiener
 
-SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -12.0, "bounds": (-30.0, 10.0)}
 SEEKERS = stepped(**SPACE)
 
 

@@ -33,7 +33,7 @@ from mgdd.engine import (
 )
 from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import (
@@ -95,7 +95,7 @@ def bench_run() -> xr.Dataset:
 
 
 def seeker() -> optimize.ExtremumSeeking:
-    return optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    return optimize.ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0))
 
 
 def rig_run() -> xr.Dataset:
@@ -111,7 +111,7 @@ def learned() -> xr.Dataset:
 
 
 def guided() -> FeedForward:
-    ff = FeedForward(optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), lambda fuel: -0.35 * fuel)
+    ff = FeedForward(optimize.ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0)), lambda fuel: -0.35 * fuel)
     for fuel in (12.0, 12.0, 30.0):
         ff.at(fuel)
         ff.tell(-float((ff.ask()[0] + 0.35 * fuel) ** 2))
@@ -120,7 +120,7 @@ def guided() -> FeedForward:
 
 def guided_engine() -> GuidedEngine:
     bench, model = VirtualEngine(), ModelOptimum(Cylinder())
-    engine = GuidedEngine(optimize.ExtremumSeeking(start=-6.0, lower=-30.0, upper=10.0), model, bench.point)
+    engine = GuidedEngine(optimize.ExtremumSeeking(start=-6.0, bounds=(-30.0, 10.0)), model, bench.point)
     run_seeker(bench, engine, 3)
     return engine
 
@@ -170,7 +170,7 @@ def loop_samples() -> xr.Dataset:
 
 
 def whole_cycles() -> Indicating:
-    return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0)
+    return Indicating(Cylinder(), np.arange(-360.0, 360.0), speed_rpm=6000.0)
 
 
 def verdict() -> Any:
@@ -178,7 +178,7 @@ def verdict() -> Any:
 
 
 def indicating() -> Indicating:
-    return Indicating(np.arange(-180.0, 181.0), Cylinder(), speed_rpm=6000.0)
+    return Indicating(Cylinder(), np.arange(-180.0, 181.0), speed_rpm=6000.0)
 
 
 def wall_heat() -> xr.Dataset:
@@ -197,7 +197,7 @@ def fitted_load() -> xr.Dataset:
 
 
 SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
-NEEDS = ("advisor_engine_maps", "cascaded_tanks", "emps", "h2df_502", "wh2009")
+NEEDS = ("advisor_engine_maps", "h2df_502")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
@@ -236,10 +236,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "results.FitReport.dataset": lambda _: report().dataset,
-    "results.Fit.dataset": lambda _: fit_first_principle(
-        log(), options=optimize.FitOptions(n_starts=1)
-    ).dataset,
-    "results.Fit.run": lambda _: fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
+    "results.Fit.dataset": lambda _: fit_groups(log(), delays=[0.0], options=optimize.FitOptions(n_starts=1)).dataset,
+    "results.Fit.run": lambda _: fit_groups(log(), delays=[0.0], options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "guide.FeedForward.history": lambda _: guided().history,
     "guide.GuidedEngine.history": lambda _: guided_engine().history,
@@ -269,8 +267,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "maps.compare_maps": lambda _: compare_maps(timing_table(), timing_table(), tolerance=0.5),
     "report.Report.dataset": lambda _: quick_study("sensor-delay").dataset,
     "sweep.sweep": lambda _: [
-        sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, traces="pressure_bar"),
-        sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, points=True),
+        sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, keep_traces="pressure_bar"),
+        sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, pointwise=True),
     ],
     "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),

@@ -80,7 +80,7 @@ def test_identify_a_throttle_log_from_a_data_frame() -> None:
 def test_plot_a_run_of_a_seeker() -> None:
     limits = {"p_max_bar": 95}
     bench = mgdd.loop.VirtualEngine("puma_single", limits=limits)
-    seeker = mgdd.optimize.ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0, limits=limits)
+    seeker = mgdd.optimize.ExtremumSeeking(start=-2.0, bounds=(-30.0, 10.0), limits=limits)
     run = mgdd.loop.run_seeker(bench, seeker, 300)
     assert len(mgdd.plot.seeking(run).figure.axes) == len(run.plot().figure.axes)
     assert run.summary["final_soc_cad"] > -30.0
@@ -110,7 +110,7 @@ def test_track_a_step_with_a_fitted_model() -> None:
 
 
 def test_save_and_load_each_result(tmp_path: Path) -> None:
-    seeker = mgdd.optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    seeker = mgdd.optimize.ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0))
     run = mgdd.loop.run_seeker(mgdd.loop.VirtualEngine("puma_single"), seeker, 50)
     run.to_netcdf(tmp_path / "run.nc")
     assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "soc_cad [°CA aTDC]"
@@ -182,7 +182,7 @@ def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
         (lambda: mgdd.engine.simulate("puma_single", 1200), r"point = 1200: must be an OperatingPoint.*'speed_rpm'"),
         (lambda: mgdd.throttle.simulate_throttle("puma_single", 0.5), "is an engine, not a throttle"),
         (lambda: mgdd.loop.VirtualThrottle(3.0), "throttle = 3.0: must be a Throttle, a preset, or the name of one"),
-        (lambda: mgdd.loop.VirtualEngine(3.0), "engine = 3.0: must be a Cylinder"),
+        (lambda: mgdd.loop.VirtualEngine(3.0), "cylinder = 3.0: must be a Cylinder"),
         (lambda: mgdd.maps.write_map(3.0, "a.csv"), "table = 3.0: must be a CalibrationMap"),
         (lambda: mgdd.engine.find_optimum("puma_single", limits=95.0), "limits = 95.0: must map names to numbers"),
     ],
@@ -202,7 +202,7 @@ def test_a_signal_keeps_its_own_time() -> None:
 
 def test_limits_have_one_grammar() -> None:
     by_name, objects = {"p_max_bar": 95}, [mgdd.optimize.Limit("p_max_bar", 95)]
-    start = {"start": -2.0, "lower": -30.0, "upper": 10.0}
+    start = {"start": -2.0, "bounds": (-30.0, 10.0)}
     made = []
     for limits in (by_name, objects):
         seeker = mgdd.optimize.ExtremumSeeking(**start, limits=limits)

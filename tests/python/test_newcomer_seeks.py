@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import mgdd
-from mgdd.loop import FunctionPlant, VirtualEngine, monte_carlo, run_seeker, seek
-from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Input, Limit, Seeker, Spsa
+from mgdd.loop import VirtualEngine, run_seeker, seek
+from mgdd.optimize import GaussianProcessSeeking, Input, Seeker, Spsa
 
 RNG = np.random.default_rng(4)
 
@@ -65,12 +65,6 @@ def a_lower_limit() -> bool:
     return 7.8 < found.limits["ca50_cad"] < 10.0 and "(lower limit 8)" in found.summary()
 
 
-def a_late_limit() -> bool:
-    bench = VirtualEngine(seed=1, limits=["p_max_bar"])
-    late = [Limit("p_max_bar", 95.0, delay_cycles=2.0)]
-    return seek(bench, {"soc_cad": (-20.0, 8.0)}, limits=late, start=4.0, cycles=80).limits["p_max_bar"] < 110.0
-
-
 def a_seeker_by_name() -> bool:
     found = seek(VirtualEngine(seed=1), {"soc_cad": (-20.0, 5.0)}, seeker="spsa", cycles=600)
     return found.seeker.kind == "Spsa" and abs(found.inputs["soc_cad"] + 5.63) < 2.0
@@ -79,11 +73,6 @@ def a_seeker_by_name() -> bool:
 def a_seeker_by_class_with_settings() -> bool:
     settings = {"form": "second_order"}
     return seek(hill, ONE, seeker=Spsa, settings=settings, cycles=40).seeker.settings["form"] == "second_order"
-
-
-def a_seeker_of_my_own() -> bool:
-    seeker = ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0)
-    return abs(seek(VirtualEngine(seed=1), seeker=seeker, cycles=600).inputs["soc_cad"] + 5.63) < 2.0
 
 
 def going_on() -> bool:
@@ -128,12 +117,6 @@ def a_table() -> bool:
     return list(table.columns) == ["soc_cad", "egr"] and len(table) == 20
 
 
-def many_seeds() -> bool:
-    seeker = GaussianProcessSeeking(inputs=ONE, start={"soc_cad": 5.0})
-    table = monte_carlo(VirtualEngine(), seeker, range(3), cycles=20)
-    return table.sizes["seed"] == 3
-
-
 def a_guide_that_is_rough() -> bool:
     guide = lambda x: -0.04 * (x["soc_cad"] + 1.0) ** 2 - 250.0 * (x["egr"] - 0.2) ** 2  # noqa: E731
     return abs(seek(hill, TWO, guide=guide, cycles=30).inputs["soc_cad"] + 4.0) < 2.0
@@ -160,11 +143,6 @@ def until_it_is_good_enough() -> bool:
 def in_steps() -> bool:
     found = seek(hill, {"soc_cad": (-25.0, 15.0, 0.5), "egr": (0.0, 0.4, 0.05)}, cycles=80)
     return found.inputs["egr"] == pytest.approx(0.15) and found.inputs["soc_cad"] % 0.5 == 0.0
-
-
-def a_plant_with_noise() -> bool:
-    plant = FunctionPlant(lambda x: -((x["x"] - 2.0) ** 2), ["x"], noise_sd=0.1, seed=3)
-    return abs(seek(plant, {"x": (-5.0, 5.0)}, cycles=100).inputs["x"] - 2.0) < 0.5
 
 
 PROGRAMS = [

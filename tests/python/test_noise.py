@@ -24,7 +24,7 @@ A_TABLE = [
 
 
 def indicating(angle: np.ndarray = ANGLE, speed_rpm: float = SPEED) -> Indicating:
-    return Indicating(angle, "puma_single", speed_rpm=speed_rpm)
+    return Indicating("puma_single", angle, speed_rpm=speed_rpm)
 
 
 def tone(hz: float, bar: float, phase: float = 0.3) -> np.ndarray:

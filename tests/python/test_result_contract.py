@@ -22,7 +22,7 @@ from mgdd import datasets, identify, io, plot, presets
 from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignition_delay, simulate
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
@@ -56,13 +56,13 @@ def cylinder_fit() -> Any:
 
 @cache
 def throttle_fit() -> Any:
-    return fit_first_principle(log(), options=FitOptions(n_starts=1))
+    return fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1))
 
 
 @cache
 def run() -> Any:
     limits = {"p_max_bar": 95.0}
-    seeker = ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0, limits=limits)
+    seeker = ExtremumSeeking(start=-2.0, bounds=(-30.0, 10.0), limits=limits)
     return run_seeker(VirtualEngine(seed=1, limits=limits), seeker, 300)
 
 
@@ -236,7 +236,7 @@ def analysed() -> xr.Dataset:
 
 def record() -> xr.Dataset:
     made = pressures()
-    return Indicating(made["crank_angle_cad"], "puma_single", speed_rpm=1500.0).record(made["pressure_bar"])
+    return Indicating("puma_single", made["crank_angle_cad"], speed_rpm=1500.0).record(made["pressure_bar"])
 
 
 class Drawn(Result):
@@ -273,9 +273,9 @@ def test_a_run_of_several_inputs_has_a_panel_each() -> None:
     surrogate = fit_surrogate(random_step_records(1500))
     start = [surrogate.medians[name] for name in ("soi_cad", "doi_main_ms")]
     seeker = ExtremumSeeking(
-        start=start, lower=[start[0] - 5.0, start[1] - 0.2], upper=[start[0] + 5.0, start[1] + 0.2],
+        start=start, bounds=([start[0] - 5.0, start[1] - 0.2], [start[0] + 5.0, start[1] + 0.2]),
         amplitude=[0.5, 0.02], period=40, harmonics=[4, 5],
     )  # fmt: skip
     run = run_seeker(SurrogatePlant(surrogate, inputs=["soi_cad", "doi_main_ms"]), seeker, 40)
     labels = [panel.get_ylabel() for panel in run.plot().figure.axes]
-    assert labels[:3] == ["soi_cad [°CA aTDC]", "doi_main_ms [ms]", "J [unit of J]"]
+    assert labels[:3] == ["soi_cad [°CA aTDC]", "doi_main_ms [ms]", "imep [bar]"]

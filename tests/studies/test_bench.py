@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
 from collections.abc import Callable
 
@@ -11,10 +10,8 @@ import numpy as np
 import pytest
 
 from mgdd.loop import VirtualEngine
-from mgdd.results.labels import check_labels
 from mgdd_studies import run_study
 from mgdd_studies.base import StudyResult
-from mgdd_studies.registry import available_studies
 
 
 @pytest.fixture(scope="module")
@@ -32,26 +29,8 @@ def four_tests(quick_study: Callable[..., StudyResult]) -> StudyResult:
     return quick_study("timing-tests")
 
 
-@pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])
-def test_summary_dataset_and_figures(name: str, request: pytest.FixtureRequest) -> None:
-    result: StudyResult = request.getfixturevalue(name)
-    check_labels(result.dataset)
-    assert json.loads(json.dumps(result.summary, allow_nan=False)) == result.summary
-    assert result.summary["study"] == result.name
-    assert result.name in available_studies()
-    assert result.summary["interrupted"] is False
-    rows = result.summary["rows"]
-    assert all(list(row) == list(rows[0]) for row in rows)
-    assert all(value is None or isinstance(value, str | int | float) for row in rows for value in row.values())
-    for figure in result.figures.values():
-        figure.canvas.draw()
-        assert any(axes.get_xlabel() for axes in figure.axes) or figure.get_supxlabel()
-    for key in [name for name in rows[0] if f"{name}_low" in rows[0]]:
-        assert all(row[f"{key}_low"] <= row[key] <= row[f"{key}_high"] for row in rows), key
-
-
 def test_without_figures_and_with_seeds() -> None:
-    result = run_study("nox-sensors", seeds=1, figures=False)
+    result = run_study("nox-sensors", n_seeds=1, figures=False)
     assert result.figures == {}
     assert result.summary["seeds"] == 1
     assert result.summary["rows"][0]["steady_error_percent_low"] is None  # one seed says nothing of its spread

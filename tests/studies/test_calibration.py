@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 from mgdd.engine import OperatingPoint
 from mgdd.guide import ModelOptimum
-from mgdd.results.labels import check_labels
 from mgdd_studies.base import StudyResult
 from mgdd_studies.calibrated_guide_cases import (
     BURN,
@@ -295,35 +293,20 @@ def test_a_guide_that_learns_with_few_seeds(calibrated: StudyResult) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, calibrated: StudyResult) -> None:
+def test_the_page_has_the_rows_of_the_study(
+    root: Path, study_tables: ModuleType, online: StudyResult, calibrated: StudyResult
+) -> None:
     """Labels alone: the numbers there are of 200 seeds, and `tools/study_tables.py` prints them."""
-    spec = importlib.util.spec_from_file_location("study_tables", root / "tools" / "study_tables.py")
-    assert spec is not None
-    assert spec.loader is not None
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
     text = (root / "docs" / "study_guide_learning.md").read_text(encoding="utf-8")
     page = text.splitlines()
     for result in (online, calibrated):
-        for lines in tool.tables(result.name, result.summary).values():
+        for lines in study_tables.tables(result.name, result.summary).values():
             at = page.index(lines[0])
             words = [[cell for cell in line.split(" | ") if not any(map(str.isdigit, cell))] for line in lines[2:]]
             for own, printed in zip(words, page[at + 2 :], strict=False):
                 assert all(cell in printed for cell in own if cell not in ("– |", "–", "never", "never |"))
             assert not page[at + len(lines)].startswith("|")
-        other = tool.put_into(text, result.name, result.summary)
+        other = study_tables.put_into(text, result.name, result.summary)
         assert other != text
         assert len(other.splitlines()) == len(page)
-        assert tool.put_into(other, result.name, result.summary) == other
-
-
-@pytest.mark.slow
-def test_datasets_figures_and_bars(online: StudyResult, calibrated: StudyResult) -> None:
-    for result in (online, calibrated):
-        check_labels(result.dataset)
-        assert len(result.figures) == 2
-        json.dumps(result.summary, allow_nan=False)
-        assert all(bar["met"] == (bar["cases"] == bar["cases_met"]) for bar in result.summary["bars"])
-    assert len(online.summary["bars"]) == 8
-    assert len(calibrated.summary["bars"]) == 12
-    assert WRONG.wall_heat_scale == 2.0 * TRUE_SCALE
+        assert study_tables.put_into(other, result.name, result.summary) == other

@@ -135,9 +135,9 @@ def test_ctrl_c_while_a_study_draws_keeps_its_rows(monkeypatch: pytest.MonkeyPat
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    whole = run_study("sensor-delay", seeds=2, quick=True, figures=False)
+    whole = run_study("sensor-delay", n_seeds=2, quick=True, figures=False)
     monkeypatch.setattr("matplotlib.figure.Figure.__init__", stop)
     with pytest.raises(Interrupted, match=r"while it drew: all \d+ rows are in \.partial") as stopped:
-        run_study("sensor-delay", seeds=2, quick=True, figures=True)
+        run_study("sensor-delay", n_seeds=2, quick=True, figures=True)
     assert isinstance(stopped.value.partial, StudyResult)
     assert stopped.value.partial.summary["rows"] == whole.summary["rows"]

@@ -11,13 +11,14 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
-from mgdd import _core, datasets
+from mgdd import _core
 from mgdd.datasets.files import path
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import FitOptions
 from mgdd.results import Fit
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies import run_study
+from mgdd_studies.benchmarks import records
 from mgdd_studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd_studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
 from mgdd_studies.benchmarks.wiener_hammerstein import (
@@ -29,7 +30,7 @@ from mgdd_studies.benchmarks.wiener_hammerstein import (
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {
-    name: pytest.mark.skipif(name not in datasets.names(), reason=f"MGDD_DATA_DIR holds no folder {name}")
+    name: pytest.mark.skipif(name not in records.names(), reason=f"MGDD_DATA_DIR holds no folder {name}")
     for name in SETS
 }
 SLIDE = {"mass_kg": 90.0, "viscous_ns_per_m": 200.0, "coulomb_n": 21.0, "offset_n": 1.0}
@@ -227,7 +228,7 @@ def test_missing_sets_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MGDD_DATA_DIR", raising=False)
     for name in ("emps", "cascaded_tanks", "wh2009"):
         with pytest.raises(FileNotFoundError, match="MGDD_DATA_DIR"):
-            datasets.read(name)
+            records.read(name)
     with pytest.raises(DataError, match="at least one of emps, cascaded_tanks, wh2009"):
         run_study("identification-benchmarks", quick=True)
 
@@ -238,15 +239,15 @@ def test_a_file_that_is_another_is_refused(tmp_path: Path, monkeypatch: pytest.M
     file = tmp_path / "wh2009" / "WienerHammerBenchmark.csv"
     file.write_text("a,b\n1,2\n")
     with pytest.raises(DataError, match="uBenchMark, yBenchMark were expected"):
-        datasets.read("wh2009")
+        records.read("wh2009")
     file.write_text('"uBenchMark","yBenchMark",\n1,2,\n1,2,\n')
     with pytest.raises(DataError, match="needs 184000"):
-        datasets.read("wh2009")
+        records.read("wh2009")
 
 
 @needs["emps"]
 def test_emps_inverse_dynamics_and_free_run() -> None:
-    train, test = datasets.read("emps")
+    train, test = records.read("emps")
     found = drive_inverse_dynamics(train, directional=False)
     # Figures of an independent inverse-dynamics fit with the same filter.
     assert found["mass_kg"] == pytest.approx(95.138, abs=0.1)
@@ -263,7 +264,7 @@ def test_emps_inverse_dynamics_and_free_run() -> None:
 
 @needs["cascaded_tanks"]
 def test_cascaded_tanks_from_the_stated_window() -> None:
-    train, test = datasets.read("cascaded_tanks")
+    train, test = records.read("cascaded_tanks")
     fit = fit_two_tanks(train)
     assert fit.train.rmse == pytest.approx(0.1537, abs=5e-4)
     assert fit.report.rmse == pytest.approx(fit.train.rmse, rel=1e-9)
@@ -279,7 +280,7 @@ def test_cascaded_tanks_from_the_stated_window() -> None:
 @pytest.mark.slow
 @needs["wh2009"]
 def test_the_circuit_below_a_millivolt() -> None:
-    train, test = datasets.read("wh2009")
+    train, test = records.read("wh2009")
     assert (train.sizes["time_s"], test.sizes["time_s"]) == (100_000, 78_800)
     fit = fit_wiener_hammerstein(train.isel(time_s=slice(0, 20_000)), scan_samples=8000, follow=8)
     error = (fit.model.simulate(test)["output_v"] - test["output_v"]).to_numpy()[50:]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 from mgdd.engine import OperatingPoint, ignition_delay
 from mgdd.loop import VirtualEngine
-from mgdd.results.labels import check_labels
 from mgdd_studies.base import StudyResult
 from mgdd_studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
 from mgdd_studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, assumed_laws
@@ -125,9 +123,3 @@ def test_a_new_curve_is_drawn_after_the_step() -> None:
     run = drive(bench, curve_seeker(guide.curve(MEASURED_AT)), 31, curve_at=guide.curve, soc_of=WATSON.soc_of)
     move = guide(LATE)["soi_cad"] - guide(MEASURED_AT)["soi_cad"]
     assert run.estimate[30] - run.estimate[29] == pytest.approx(move, abs=0.8)
-
-
-def test_dataset_and_figures(result: StudyResult) -> None:
-    check_labels(result.dataset)
-    assert len(result.figures) == 3
-    json.dumps(result.summary, allow_nan=False)

@@ -48,7 +48,7 @@ def test_noise_is_read_at_the_period_of_the_dither() -> None:
 @pytest.mark.usefixtures("on_made_records")
 def test_rows_and_dataset_on_made_records(made: EngineSurrogate) -> None:
     told: list[str] = []
-    result = run_measured_engine_seek(seeds=2, quick=True, progress=told.append)
+    result = run_measured_engine_seek(n_seeds=2, quick=True, progress=told.append)
     check_labels(result.dataset)
     assert (result.name, result.summary["study"], result.summary["seeds"]) == (
         "measured-engine-seek",
@@ -82,7 +82,7 @@ def test_rows_and_dataset_on_made_records(made: EngineSurrogate) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("on_made_records")
 def test_knowing_the_lag_is_what_finds_the_optimum() -> None:
-    result = run_measured_engine_seek(seeds=2, figures=False)
+    result = run_measured_engine_seek(n_seeds=2, figures=False)
     assert result.figures == {}
     known, ignored = row(result, "lag known", "batch"), row(result, "lag ignored", "batch")
     assert abs(known["error_cad"]) < 1.0
@@ -93,8 +93,8 @@ def test_knowing_the_lag_is_what_finds_the_optimum() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("on_made_records")
 def test_the_same_seeds_give_the_same_numbers() -> None:
-    first = run_measured_engine_seek(seeds=1, quick=True, figures=False)
-    second = run_measured_engine_seek(seeds=2, quick=True, figures=False)
+    first = run_measured_engine_seek(n_seeds=1, quick=True, figures=False)
+    second = run_measured_engine_seek(n_seeds=2, quick=True, figures=False)
     np.testing.assert_array_equal(first.dataset["final_soi_cad"][:, 0], second.dataset["final_soi_cad"][:, 0])
     assert (second.dataset["final_soi_cad"][:, 0] != second.dataset["final_soi_cad"][:, 1]).any()
     assert first.summary["rows"][0]["final_soi_cad_low"] is None
@@ -109,7 +109,7 @@ def test_ctrl_c_keeps_the_finished_seekers(made: EngineSurrogate, monkeypatch: p
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted) as stop:
-        run_measured_engine_seek(seeds=1, quick=True, progress=press)
+        run_measured_engine_seek(n_seeds=1, quick=True, progress=press)
     result = stop.value.partial
     assert result.summary["interrupted"] is True
     assert [row["seeker"] for row in result.summary["rows"]] == ["batch"]
@@ -118,7 +118,7 @@ def test_ctrl_c_keeps_the_finished_seekers(made: EngineSurrogate, monkeypatch: p
 
 def test_errors_name_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
-        run_measured_engine_seek(seeds=0)
+        run_measured_engine_seek(n_seeds=0)
     monkeypatch.delenv("MGDD_DATA_DIR", raising=False)
     with pytest.raises(DataError, match="MGDD_DATA_DIR"):
         run_study("measured-engine-seek", quick=True)
@@ -127,7 +127,7 @@ def test_errors_name_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @needs_records
 def test_on_the_measured_engine() -> None:
-    result = run_measured_engine_seek(seeds=2, figures=False)
+    result = run_measured_engine_seek(n_seeds=2, figures=False)
     assert "10.5281/zenodo.16902579" in result.summary["records"]["citation"]
     limited, known, ignored = (row(result, name, "batch") for name in ("≤ 5", "lag known", "lag ignored"))
     assert limited["optimum_soi_cad"] == pytest.approx(-2.16, abs=0.02)

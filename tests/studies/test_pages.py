@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 from mgdd import datasets
 from mgdd.cli import main
 from mgdd.report import write_report
-from mgdd.results.labels import labelled_dataset
+from mgdd.results.labels import check_labels, labelled_dataset
 from mgdd_studies.base import StudyResult
+from mgdd_studies.benchmarks import records
 from mgdd_studies.registry import available_studies
 from mgdd_studies.verdicts import verdict_of
 
@@ -71,9 +72,17 @@ DEAR = {
     "name", [pytest.param(name, marks=pytest.mark.slow if name in DEAR else []) for name in available_studies()]
 )
 def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Callable[..., StudyResult]) -> None:
-    if name in NEEDS and NEEDS[name] not in datasets.names():
+    if name in NEEDS and NEEDS[name] not in (*datasets.names(), *records.names()):
         pytest.skip(f"the data set {NEEDS[name]} is not at hand")
     result = quick_study(name)
+    check_labels(result.dataset)
+    assert json.loads(json.dumps(result.summary, allow_nan=False)) == result.summary
+    assert result.summary["interrupted"] is False
+    for row in (rows := result.summary["rows"]):
+        assert row.keys() == rows[0].keys() or name == "identification-benchmarks"  # a benchmark in a row
+        for low in (key for key in row if key.endswith("_low") and key.removesuffix("_low") in row):
+            middle = low.removesuffix("_low")
+            assert row[low] is None or row[low] <= row[middle] <= row[f"{middle}_high"], low
     file = write_report(result, tmp_path / "deep" / "page")
     assert file == tmp_path / "deep" / "page" / "index.html"
     text = file.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Means over seeds: the interval is Student's, it covers as it says, and what never arrived is left out."""
+"""Means over seeds and the curves of them: intervals cover as they say, what never arrived is left out."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from mgdd.errors import DataError
 from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Spsa
+from mgdd.results.labels import labelled_dataset
+from mgdd_studies.curves import convergence
 from mgdd_studies.statistics import (
     band_variables,
     estimates,
@@ -48,7 +51,7 @@ def test_rms_and_bands() -> None:
     assert rms([3.0, 4.0]) == pytest.approx(math.sqrt(12.5))
 
     def make(seed: int) -> tuple[VirtualEngine, ExtremumSeeking]:
-        return VirtualEngine(seed=seed), ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+        return VirtualEngine(seed=seed), ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 
     found = estimates(make, range(11), 120)
     variables = band_variables("x_{}_cad", ("run", "cycle"), [found], "°CA", with_quantiles("x"))
@@ -63,7 +66,7 @@ def test_rms_and_bands() -> None:
 @pytest.mark.parametrize("form", ["batch", "moving_average"])
 def test_slope_belongs_to_the_same_trajectory(form: str) -> None:
     def seeker() -> ExtremumSeeking:
-        return ExtremumSeeking(start=-15.0, lower=-30.0, upper=10.0, form=form, hold_cycles=400)
+        return ExtremumSeeking(start=-15.0, bounds=(-30.0, 10.0), form=form, hold_cycles=400)
 
     quiet = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
     bench, mine = VirtualEngine(**quiet), seeker()
@@ -77,8 +80,37 @@ def test_slope_belongs_to_the_same_trajectory(form: str) -> None:
 
 
 def test_loops_are_those_of_the_monte_carlo_over_seeds_alone() -> None:
-    seeker = Spsa(start=-12.0, lower=-30.0, upper=10.0)
+    seeker = Spsa(start=-12.0, bounds=(-30.0, 10.0))
     table = loops(VirtualEngine(), seeker, range(3), cycles=50)
     assert dict(table.sizes) == {"seed": 3}
     whole = monte_carlo(VirtualEngine(), seeker, range(3), cycles=50)
     np.testing.assert_array_equal(table["mean_soc_cad"], whole["mean_soc_cad"][0, 0])
+
+
+CYCLE = np.arange(300)
+
+
+def tracks():
+    cases, dims = ["slow", "fast"], ("case", "cycle")
+    curves = np.stack([-6.0 - 9.0 * np.exp(-CYCLE / t) for t in (80.0, 20.0)])
+    cad = "°CA aTDC"
+    return labelled_dataset({
+        "cycle": ("cycle", CYCLE), "case": ("case", cases, "-", "case"),
+        "estimate_median_cad": (dims, curves, cad, "estimate"), "optimum_cad": ((), -6.0, cad, "optimum"),
+        "estimate_low_cad": (dims, curves - 0.5, cad, "low"), "estimate_high_cad": (dims, curves + 0.7, cad, "high"),
+    })  # fmt: skip
+
+
+def test_convergence_bands_and_refusals():
+    ax = convergence(tracks())
+    np.testing.assert_array_equal(ax.get_lines()[1].get_ydata(), tracks()["estimate_median_cad"][1])
+    assert len(ax.collections) == 2
+    band = ax.collections[0].get_paths()[0].vertices[:, 1]
+    low, high = tracks()["estimate_low_cad"][0], tracks()["estimate_high_cad"][0]
+    assert (band.min(), band.max()) == pytest.approx((float(low.min()), float(high.max())))
+    assert len(convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
+    with pytest.raises(DataError, match="must be cycle and one more"):
+        convergence(tracks().isel(case=0, drop=True))
+    many = tracks().isel(case=[0, 1] * 6).assign_coords(case=("case", list("abcdefghijkl"), tracks()["case"].attrs))
+    with pytest.raises(DataError, match="case has 12 entries: at most 9"):
+        convergence(many)

@@ -1,16 +1,27 @@
-"""Studies of the throttle: the habits of the plant, and what the first-principle fit makes of noisy logs."""
+"""Studies of the throttle: the habits of the plant, the first-principle fit of noisy logs, the controllers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
 
+import numpy as np
 import pytest
 
 from mgdd.identify.throttle.free_run import quality_of
-from mgdd.results.labels import check_labels
 from mgdd_studies import run_study
 from mgdd_studies.base import StudyResult
-from mgdd_studies.throttle_faults import CASES
+from mgdd_studies.throttle_cases import throttle_of
+from mgdd_studies.throttle_faults import CASES as FAULTS
+from mgdd_studies.throttle_tracking import (
+    CASES,
+    controllers_of,
+    row_of,
+    run_case,
+    throttles_of,
+    warm_rows,
+)
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +56,8 @@ def test_air_moves_the_plate_at_constant_duty(habits):
     assert air["-0.4 N m, at rest after unloaded"] < air["-0.3 N m, at rest after unloaded"] < -5.0
 
 
-def test_result_is_labelled_and_drawn(habits):
-    check_labels(habits.dataset)
-    assert len(habits.figures) == 3
-    assert habits.summary["seeds"] == 0
-
-
 def test_groups_are_found_also_where_the_plant_does_more(quick_study):
     result = quick_study("throttle-first-principle")
-    check_labels(result.dataset)
-    assert len(result.figures) == 3
     errors = {(row["case"], row["group"]): abs(row["error_percent"]) for row in result.summary["rows"]}
     bounds = {
         "tau_s": 8.0,
@@ -87,8 +90,6 @@ def test_a_fit_in_percent_is_that_of_every_throttle_fit(quick_study, study):
 def test_the_torque_demand_study_says_what_each_part_is_worth():
     """All cases: they take two seconds."""
     result = run_study("torque-demand")
-    check_labels(result.dataset)
-    assert len(result.figures) == 1
     assert result.summary["seeds"] == 0
     rows = {row["case"]: row for row in result.summary["rows"]}
     believed = rows["as believed"]
@@ -107,14 +108,12 @@ def test_the_torque_demand_study_says_what_each_part_is_worth():
 
 def test_the_study_of_faults_says_so_in_a_table(quick_study: Callable[..., StudyResult]) -> None:
     result = quick_study("throttle-faults")
-    check_labels(result.dataset)
-    assert len(result.figures) == 1
     rows = result.summary["rows"]
     assert {(row["fault"], row["controller"]) for row in rows} == {
-        (name, kind) for name in CASES for kind in ("PID", "sliding mode")
+        (name, kind) for name in FAULTS for kind in ("PID", "sliding mode")
     }
     for row in rows:
-        case = CASES[row["fault"]]
+        case = FAULTS[row["fault"]]
         assert (row["mode"], row["reason"]) == (case.mode, case.reason)
         assert row["safe_ms"] <= 50.0
         assert row["kept"]
@@ -143,3 +142,78 @@ def test_a_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> Non
     assert rows["P1", "pw_w"]["fit_steps_percent"] <= 50.0
     assert rows["P1", "persistence"]["ahead_20_ms_deg"] == pytest.approx(1.548, abs=0.01)
     assert len(result.figures) == 4
+
+
+@pytest.fixture(scope="module")
+def few() -> dict[str, dict[str, float]]:
+    runs = run_case("unknown", "P1", 12)
+    return {str(kind): row_of("unknown", "P1", str(kind), runs) for kind in runs["controller"].to_numpy()}
+
+
+def test_the_guided_controller_is_not_beaten_where_it_says_so(few: dict[str, dict[str, float]]) -> None:
+    guided = few.pop("guided")
+    assert guided["limit_cycles"] == 0
+    assert guided["variation_rest"] < 0.01 < min(row["variation_rest"] for row in few.values())
+    for name in ("large_p95_ms", "small_p95_ms", "up_p95_ms", "down_p95_ms", "sine_mse_deg2"):
+        assert guided[name] <= 1.2 * min(row[name] for row in few.values()), name
+
+
+def test_far_throttles_unsettle_the_baselines_only() -> None:
+    runs = run_case("far", "P1", 16)
+    rows = {kind: row_of("far", "P1", kind, runs) for kind in ("guided", "linear_mpc", "pid")}
+    assert rows["guided"]["limit_cycles"] == 0
+    assert rows["guided"]["small_p95_ms"] < min(rows["linear_mpc"]["small_p95_ms"], rows["pid"]["small_p95_ms"])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_case_does_what_it_says(name: str) -> None:
+    case = CASES[name]
+    throttles = throttles_of(case, "P1", 3)
+    assert throttles == throttles_of(case, "P1", 3)
+    assert len({throttle.coulomb_nm for throttle in throttles}) == 3
+    assert all((throttle.friction == "lugre") == case.bristles for throttle in throttles)
+    known = controllers_of(case, throttle_of("P1"))
+    assert list(known) == list(case.controllers)
+
+
+def test_what_was_learnt_is_worth_knowing_it() -> None:
+    rows = {(row["wrong"], row["controller"]): row for row in warm_rows("P1", 5)}
+    for wrong in ("friction 40 % higher", "preload 40 % higher"):
+        for column in ("sine_mse_deg2", "crossing_mse_deg2"):
+            assert rows[wrong, "after 2 s"][column] <= 1.25 * rows[wrong, "known"][column]
+
+
+@pytest.fixture(scope="module")
+def quick(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("throttle-tracking")
+
+
+def test_the_study_runs_and_draws(quick: StudyResult) -> None:
+    result = quick
+    assert [row["controller"] for row in result.summary["rows"]] == list(CASES["unknown"].controllers)
+    assert set(result.dataset["settling_ms"].dims) == {"preset", "throttle", "controller", "reference"}
+    assert np.isfinite(result.dataset["mse_deg2"].to_numpy()).all()
+    (figure,) = result.figures.values()
+    assert len(figure.axes) == 4
+
+
+def test_the_page_has_a_table_of_every_case(root: Path, study_tables: ModuleType, quick: StudyResult) -> None:
+    """Cases, presets and controllers alone: the numbers there are of 100 throttles, by `tools/study_tables.py`."""
+    text = (root / "docs" / "throttle_tracking.md").read_text(encoding="utf-8")
+    page = text.splitlines()
+    some = quick.summary["rows"][0]
+    rows = [
+        some | {"case": case.text, "preset": preset, "controller": controller}
+        for case in CASES.values()
+        for preset in case.presets
+        for controller in case.controllers
+    ]
+    tables = study_tables.tables("throttle-tracking", quick.summary | {"rows": rows})
+    assert list(tables) == [*(case.text for case in CASES.values()), "warm"]
+    for lines in tables.values():
+        at = page.index(lines[0])
+        for made, printed in zip(lines[2:], page[at + 2 :], strict=False):
+            assert made.split(" | ")[:2] == printed.split(" | ")[:2]
+    made = study_tables.put_into(text, "throttle-tracking", quick.summary)
+    assert made != text
+    assert study_tables.put_into(made, "throttle-tracking", quick.summary) == made

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Callable
 
 import numpy as np
@@ -14,7 +13,7 @@ from mgdd import datasets, presets
 from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
-from mgdd.results.labels import ANGLE, check_labels
+from mgdd.results.labels import ANGLE
 from mgdd_studies.base import StudyResult
 from mgdd_studies.validation_fits import LAWS, Burn, Law, best_slopes, burns_of, meet, redraw
 
@@ -160,10 +159,3 @@ def test_what_a_quick_run_shows(result: StudyResult) -> None:
         assert row["lost_p95_percent"] == pytest.approx(float(lost.sel(law=law, file=file)), rel=1e-9)
     for row in result.summary["coverage"]:
         assert row["block_parameters_share"] < row["white_parameters_share"]
-
-
-@pytest.mark.slow
-def test_dataset_and_figures(result: StudyResult) -> None:
-    check_labels(result.dataset)
-    assert len(result.figures) == 2
-    json.dumps(result.summary, allow_nan=False)

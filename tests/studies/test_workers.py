@@ -28,7 +28,7 @@ LONG = {
     "model-validation",
     "throttle-pseudo-wiener",
 }
-DELAYS: dict[str, Any] = {"seeds": 2, "quick": True, "figures": False}
+DELAYS: dict[str, Any] = {"n_seeds": 2, "quick": True, "figures": False}
 
 
 def same(one: StudyResult, two: StudyResult) -> bool:
@@ -47,7 +47,7 @@ ALL = sorted(set(available_studies()) - LONG - {"measured-traces"})
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in SHORT else pytest.mark.slow) for name in ALL])
 def test_parts_that_travel_give_the_same_table(name: str) -> None:
     options = {"quick": True, "figures": False}
-    options |= {"seeds": 1} if "seeds" in inspect.signature(function_of(name)).parameters else {}
+    options |= {"n_seeds": 1} if "n_seeds" in inspect.signature(function_of(name)).parameters else {}
     assert same(run_study(name, executor=work.Pickling(), **options), run_study(name, **options))
 
 

@@ -1,4 +1,4 @@
-// Binds include/mgdd/identify/throttle: smooth throttle, throttle groups. The GIL is released while they run.
+// Binds include/mgdd/identify/throttle: throttle groups. The GIL is released while they run.
 #include <array>
 #include <stop_token>
 #include <string>
@@ -10,64 +10,13 @@
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/identify/free_run_fit.hpp"
 #include "mgdd/identify/throttle/first_principle_fit.hpp"
-#include "mgdd/identify/throttle/smooth_fit.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
 using namespace identify;  // NOLINT(google-build-using-namespace): this file binds that room
 using throttle::FirstPrinciple;
-using throttle::SmoothPlant;
-using Set = std::array<double, 10>;
 using Groups = FirstPrincipleGroups;
-
-template <std::size_t n>
-std::vector<std::string> names_of(const std::array<std::string_view, n>& names) {
-  return {names.begin(), names.end()};
-}
-
-SmoothPlant smooth_plant(double inertia_kgm2, double gear_ratio, double inductance_h, double supply_v) {
-  require_positive("inertia_kgm2", inertia_kgm2, "kg m2");
-  require_positive("gear_ratio", gear_ratio);
-  require_positive("inductance_h", inductance_h, "H");
-  require_positive("supply_v", supply_v, "V");
-  return {inertia_kgm2, gear_ratio, inductance_h, supply_v};
-}
-
-std::vector<double> simulate_smooth(const Set& parameters, const InputArray& duty, double step_s,
-                                    const std::array<double, 3>& start, double inertia_kgm2, double gear_ratio,
-                                    double inductance_h, double supply_v) {
-  const dynamics::Rk4<SmoothPlant> family{smooth_plant(inertia_kgm2, gear_ratio, inductance_h, supply_v), 1};
-  const std::vector<double> u = to_column(duty, "duty");
-  require_positive("step_s", step_s, "s");
-  const py::gil_scoped_release release;
-  return free_run(family, {parameters.begin(), parameters.end()}, {start.begin(), start.end()}, u, step_s);
-}
-
-py::dict fit_smooth(const InputArray& duty, const InputArray& angle_deg, const std::vector<Set>& starts,
-                    const Set& lower, const Set& upper, double step_s, const std::array<double, 3>& start,
-                    double inertia_kgm2, double gear_ratio, double inductance_h, double supply_v, double cost_tolerance,
-                    bool lanes) {
-  const std::vector<double> u = to_column(duty, "duty"), y = to_column(angle_deg, "angle_deg");
-  const SmoothPlant plant{inertia_kgm2, gear_ratio, inductance_h, supply_v};
-  SmoothThrottleFitOptions options = smooth_throttle_options(throttle::smooth_plant_example);
-  options.lower = lower;
-  options.upper = upper;
-  options.stages.back().cost_tolerance = cost_tolerance;
-  options.lanes = lanes;
-  return hand_over(interruptible([&](std::stop_token stop) {
-                     options.stop = std::move(stop);
-                     return fit_smooth_throttle(plant, {step_s, start, u, y}, starts, options);
-                   }),
-                   [](const SmoothThrottleFit& fit) {
-                     py::dict result;
-                     result["reports"] = fit.reports;
-                     result["best"] = fit.best;
-                     result["n_reached"] = fit.n_reached;
-                     result["n_sweeps"] = fit.n_sweeps;
-                     return result;
-                   });
-}
 
 FirstPrinciple groups_model(double closed_deg, double open_deg, int substeps) {
   FirstPrinciple model;
@@ -136,19 +85,7 @@ void bind_throttle_fit(py::module_& m) {
   std::vector<std::string> group_names;
   for (const FieldInfo& field : FirstPrinciple::parameters)
     group_names.emplace_back(field.name);
-  m.attr("smooth_names") = py::tuple(py::cast(names_of(SmoothPlant::parameter_names)));
-  m.attr("smooth_example") = py::tuple(py::cast(throttle::smooth_plant_example));
   m.attr("group_names") = py::tuple(py::cast(group_names));
-  m.def(
-      "simulate_smooth_throttle",
-      [](const Set& p, const InputArray& duty, double step_s, const std::array<double, 3>& start, double j, double n,
-         double l, double v) { return to_array(simulate_smooth(p, duty, step_s, start, j, n, l, v)); },
-      arg("parameters"), arg("duty"), py::kw_only(), arg("step_s"), arg("start"), arg("inertia_kgm2"),
-      arg("gear_ratio"), arg("inductance_h"), arg("supply_v"), "Angle [deg] on every sample; releases the GIL.");
-  m.def("fit_smooth_throttle", &fit_smooth, arg("duty"), arg("angle_deg"), py::kw_only(), arg("starts"), arg("lower"),
-        arg("upper"), arg("step_s"), arg("start"), arg("inertia_kgm2"), arg("gear_ratio"), arg("inductance_h"),
-        arg("supply_v"), arg("cost_tolerance"), arg("lanes"),
-        "Staged fit of the ten parameters from every start; releases the GIL.");
   m.def("fit_throttle_groups", &fit_groups, arg("records"), py::kw_only(), arg("stages"), arg("starts"),
         arg("closed_deg"), arg("open_deg"), arg("substeps"), arg("n_threads"),
         "Staged multi-start fit of the throttle groups; releases the GIL.");

@@ -21,7 +21,7 @@ using BoundMap = Guarded<MapSeeking>;
 void bind_map_seeking(py::module_& m) {
   using py::arg;
   py::class_<BoundMap> cls(m, "MapSeeking", "A map by Gaussian processes; see mgdd.optimize.MapSeeking.");
-  const Members& members = members_of(fields_of(MapSeekingSettings{}), MapSeekingSettings{});
+  const Members& members = seeker_members<MapSeekingSettings>();
   bind_keywords<MapSeekingSettings>(cls, members, [](MapSeekingSettings settings) {
     return BoundMap("MapSeeking", MapSeeking(std::move(settings)));
   });

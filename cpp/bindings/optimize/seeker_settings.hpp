@@ -55,11 +55,49 @@ inline void warn_each(const std::vector<std::string>& advice) {
   }
 }
 
+/// Two members, least and largest applied input, as one argument: a pair; None, of it or in it, is no bound.
+inline Member both_bounds(const Member& lower, Member upper) {
+  Member both = upper;
+  both.info.name = "bounds";
+  both.info.meaning = "least and largest applied input, each a number or one per input; none without";
+  both.standard = py::none();
+  both.initial = py::make_tuple(lower.initial, upper.initial);
+  both.get = [lower, upper](const void* record) { return py::make_tuple(lower.get(record), upper.get(record)); };
+  both.put = [lower, upper](void* record, const py::handle& value) {
+    const std::string pair = "a pair (lower, upper), each a number or one per input; bounds by name are inputs={...}";
+    const py::object sides = value.is_none() ? py::make_tuple(value, value) : py::reinterpret_borrow<py::object>(value);
+    if (!py::isinstance<py::sequence>(sides) || py::isinstance<py::str>(sides) || py::len(sides) != 2) {
+      refuse("bounds", value, pair);
+    }
+    const py::object low = sides[py::int_(0)], high = sides[py::int_(1)];
+    return lower.put(record, low.is_none() ? lower.standard : low) &&
+           upper.put(record, high.is_none() ? upper.standard : high);
+  };
+  return both;
+}
+
+/// The table of settings for Python, where bounds are one argument; it lives as long as the module.
+template <class Settings>
+const Members& seeker_members() {
+  auto* members = new Members;
+  Member lower;
+  const auto add = [&](const auto& field) {
+    Member member = member_of(field, Settings{});
+    if (member.info.name == "lower") {
+      lower = std::move(member);
+    } else {
+      members->add(member.info.name == "upper" ? both_bounds(lower, std::move(member)) : std::move(member));
+    }
+  };
+  for_each_field(fields_of(Settings{}), add);
+  return *members;
+}
+
 /// Keyword-only __init__, and `settings`, which makes the seeker again.
 template <class S>
 void bind_settings(py::class_<BoundSeeker<S>>& cls, const char* name) {
   using Settings = std::remove_cvref_t<decltype(std::declval<const S&>().settings())>;
-  const Members& members = members_of(fields_of(Settings{}), Settings{});
+  const Members& members = seeker_members<Settings>();
   bind_keywords<Settings>(cls, members, [name](Settings settings) {
     S made(std::move(settings));
     if constexpr (requires { made.settings().advice(); }) warn_each(made.settings().advice());

@@ -96,11 +96,10 @@ class CurveSeeking:
     """
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[mgdd._core.optimize.Input] | None = None, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[mgdd._core.optimize.Input] | None = None, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         curve : the guide's J
         prior_sd : how far the best input may lie from the guide's

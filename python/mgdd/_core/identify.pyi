@@ -8,7 +8,7 @@ import mgdd._core.optimize
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['CylinderFit', 'GradientPwR', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'RecursivePwR', 'WindowPwR', 'common_parameters', 'correlation_limit', 'estimate_burn', 'fit_cylinder', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'group_names', 'load_parameters', 'simulate_smooth_throttle', 'simulate_throttle_groups', 'smooth_example', 'smooth_names', 'throttle_group_bounds', 'wall_heat_scale_upper', 'with_burn']
+__all__: list[str] = ['CylinderFit', 'GradientPwR', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'RecursivePwR', 'WindowPwR', 'common_parameters', 'correlation_limit', 'estimate_burn', 'fit_cylinder', 'fit_pseudo_wiener', 'fit_throttle_groups', 'group_names', 'load_parameters', 'simulate_throttle_groups', 'throttle_group_bounds', 'wall_heat_scale_upper', 'with_burn']
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: mgdd._core.engine.OperatingPoint) -> None:
         ...
@@ -203,10 +203,6 @@ def fit_pseudo_wiener(*, kind: str, records: collections.abc.Sequence[tuple[typi
     """
     Output-error fit from several starts: parameters, report, RMSE of every search, count that reached the best.
     """
-def fit_smooth_throttle(duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"]], lower: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], upper: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex, lanes: bool) -> dict:
-    """
-    Staged fit of the ten parameters from every start; releases the GIL.
-    """
 def fit_throttle_groups(records: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]]], *, stages: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(19)"]], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex, n_threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
     """
     Staged multi-start fit of the throttle groups; releases the GIL.
@@ -214,10 +210,6 @@ def fit_throttle_groups(records: collections.abc.Sequence[tuple[typing.SupportsF
 def load_parameters() -> list[str]:
     """
     Names that may be freed per load.
-    """
-def simulate_smooth_throttle(parameters: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Angle [deg] on every sample; releases the GIL.
     """
 def simulate_throttle_groups(values: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(19)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -233,6 +225,4 @@ def with_burn(cylinder: mgdd._core.engine.Cylinder, burn: LoadBurn) -> mgdd._cor
     """
 correlation_limit: float = 0.98
 group_names: tuple = ('tau_s', 'gain_deg_per_s2_per_duty', 'beta_above_duty', 'kappa_above_duty_per_deg', 'delta_duty', 'beta_below_duty', 'kappa_below_duty_per_deg', 'limp_home_deg', 'electrical_s', 'stribeck_drop', 'stribeck_deg_per_s', 'ramp_deg', 'delay_samples', 'presliding_deg', 'presliding_damping', 'half_gap_deg', 'viscous_share', 'stop_duty_per_deg', 'stop_damping')
-smooth_example: tuple = (0.016, 0.004, 0.12, 0.5, 0.12, 0.25, 0.02, 0.14, 0.016, 1.2)
-smooth_names: tuple = ('torque_constant_nm_per_a', 'viscous_nms_per_rad', 'coulomb_nm', 'friction_width_rad_per_s', 'spring_nm_per_rad', 'preload_nm', 'preload_width_rad', 'limp_home_rad', 'emf_constant_vs_per_rad', 'resistance_ohm')
 wall_heat_scale_upper: float = 2.5

@@ -571,11 +571,10 @@ class ExtremumSeeking:
     """
     Extremum seeking; see mgdd.optimize.ExtremumSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, form: str = 'batch', amplitude: typing.Any = None, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = None, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, form: str = 'batch', amplitude: typing.Any = None, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = None, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         form : how the mean of J is removed
         amplitude : of the dither, per input
@@ -730,11 +729,10 @@ class Spsa:
     """
     Simultaneous perturbation; see mgdd.optimize.Spsa.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, form: str = 'first_order', schedule: str = 'decreasing', gain: typing.Any = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.Any = None, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.Any = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.Any = None, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, form: str = 'first_order', schedule: str = 'decreasing', gain: typing.Any = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.Any = None, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.Any = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.Any = None, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         form : order of the step
         schedule : how gain and perturbation change
@@ -905,11 +903,10 @@ class GradientDescent:
     """
     Two-sided differences; see mgdd.optimize.GradientDescent.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, step_size: typing.Any = None, difference: typing.Any = None, rate: typing.Any = None, tolerance: typing.Any = None, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, step_size: typing.Any = None, difference: typing.Any = None, rate: typing.Any = None, tolerance: typing.Any = None, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         step_size : of the step, per input
         difference : of the two measurements to the estimate, per input
@@ -1060,11 +1057,10 @@ class GoldenSection:
     """
     Golden-section search; see mgdd.optimize.GoldenSection.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         noise_sd : of one measurement of J
         significance : standard errors that decide a comparison
@@ -1232,11 +1228,10 @@ class GaussianProcessSeeking:
     """
     By Gaussian processes; see mgdd.optimize.GaussianProcessSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, kept: typing.SupportsInt | typing.SupportsIndex = 100, first_step: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, components: collections.abc.Sequence[ComponentLag] | None = None, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, kept: typing.SupportsInt | typing.SupportsIndex = 100, first_step: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, components: collections.abc.Sequence[ComponentLag] | None = None, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         noise_sd : of one reading of J
         horizon : cycles for which what is learnt pays

@@ -152,7 +152,7 @@ def _one(
 ) -> tuple[xr.Dataset, dict[str, Any], list[str | Table]]:
     """Analyse one file: its figures, and what is printed of them."""
     cylinder, point, preset = engine
-    result = analyze(trace, cylinder, point=point, traces=traces, **given)
+    result = analyze(trace, cylinder, point=point, keep_traces=traces, **given)
     named = result.attrs["gamma"]
     if named == "cylinder":
         named = cylinder.gamma if args.gamma == "constant" else args.gamma

@@ -239,6 +239,8 @@ class Parser(argparse.ArgumentParser):
         if extra:
             own = found.parser
             strange = next((word.partition("=")[0] for word in extra if word.startswith("-")), "")
+            if strange == "--interactive":  # other programs need it for what pages do anyway
+                own.error("--interactive: pages of --report show the values under the pointer: leave it out")
             strange = _OPTIONS.get(strange, strange)
             known = ["--output", *re.findall(r"--[a-z-]+", own.format_usage())]
             message = hinted(f"unrecognized arguments: {' '.join(extra)}", strange, known)

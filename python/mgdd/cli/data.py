@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _SERIES = 12  # columns of one name that are shown one by one
 _OWN = Options(read, "channels", "pressure_column", "angle_column")
-_SPEED, _FETCH = Options(read_pressure, "speed_rpm"), Options(datasets.read, "fetch")
+_SPEED = Options(read_pressure, "speed_rpm")
 _WRITERS: Mapping[str, Callable[[xr.Dataset, str], None]] = {
     ".nc": write_netcdf,
     ".csv": write_long,
@@ -50,7 +50,6 @@ def _add_file(parser: Any) -> None:
 
 def _add_get(parser: Any) -> None:
     option(parser, "name", "data set", choices=tuple(FILES))
-    _FETCH.add(parser)
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
@@ -152,7 +151,7 @@ def _list(args: argparse.Namespace) -> None:
 
 def _get(args: argparse.Namespace) -> None:
     _check_written(args)
-    found: Any = datasets.read(args.name, **_FETCH.given(args))
+    found: Any = datasets.read(args.name)
     records = list(found) if isinstance(found, list | tuple) else [found]
     files = _write(args, records)
     payload = {"name": args.name, "licence": LICENCES[args.name], "files": files}

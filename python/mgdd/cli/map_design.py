@@ -76,7 +76,7 @@ def _region(args: argparse.Namespace, limits: Mapping[str, float]) -> FeasibleRe
     how = _TIMING.given(args) | SCHEME.given(args)
 
     def indicators(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-        found = sweep(cylinder, point, columns, points=True, outputs=tuple(limits), **how)
+        found = sweep(cylinder, point, columns, pointwise=True, outputs=tuple(limits), **how)
         return {name: found[name].to_numpy() for name in limits}
 
     return FeasibleRegion.of_model(indicators, limits)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,6 @@ from mgdd.report import Table
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import xarray as xr
 
 _ALONG, _EVERY = Options(trade_off, over="along"), Options(trade_off, "every")

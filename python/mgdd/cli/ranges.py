@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import ParameterError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _Number = TypeVar("_Number", int, float)
 

@@ -114,17 +114,7 @@ _BAR = 30  # characters
 
 
 class LiveView:
-    """A table that follows a run; it leaves the terminal as it was.
-
-    Parameters
-    ----------
-    title : str
-        What runs.
-    cycles : int
-        How many there will be.
-    console : rich.console.Console, optional
-        Where to draw; standard output if left out.
-    """
+    """A table that follows a run of `cycles` cycles on the console (stdout); it leaves the terminal as it was."""
 
     def __init__(self, title: str, cycles: int, *, console: Any = None) -> None:
         from rich.console import Console

@@ -33,18 +33,14 @@ def _add_track(parser: Any) -> None:
            "step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg",
            default="step:40:42")  # fmt: skip
     _AIR.add(parser)
-    _add_plant(parser)
-    option(parser, "--model FIT.toml", "what the controller knows: a fit of mgdd throttle identify (default: preset)")
-    option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
-
-
-def _add_plant(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("plant")
     add_preset(group)
     option(group, "--plant-scale FIELD=FACTOR ...",
            "multiply a field of the plant, repeatable; the controller does not know, for example coulomb_nm=1.4 "
            "(stiction goes with it)")  # fmt: skip
     _RUN.add(group)
+    option(parser, "--model FIT.toml", "what the controller knows: a fit of mgdd throttle identify (default: preset)")
+    option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
 
 
 def _add_tune(parser: Any) -> None:

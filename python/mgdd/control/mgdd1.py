@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
 
 from mgdd import _core
-from mgdd.errors import ParameterError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+from mgdd._settings import takes_settings_of
+from mgdd.errors import ParameterError, did_you_mean
 
 _MOST_STATES = 32  # of an object that guides, as in the core
 
@@ -34,6 +34,7 @@ class Guide(Protocol):
         ...
 
 
+@takes_settings_of(_core.loop.Mgdd1)
 class Mgdd1:
     """The plainest model-guided controller of a throttle plate: one duty over the horizon, moved by model outputs only.
 
@@ -53,18 +54,8 @@ class Mgdd1:
         Length of the prediction [-], 1 to 1000.
     delay_samples : int
         From a duty to its effect, 0 to 20.
-    adaptation_gain : float
-        Share of the Gauss-Newton step [-].
-    difference : float
-        Duty by which the model is asked for its slope [-].
-    error_weight, duty_change_weight : float
-        Of the squared error at each sample [1/deg²] and of the squared change of the duty [-].
-    trim_rate_per_deg_s : float
-        Rate of the slow trim, which the model does not see [1/(deg s)].
-    reference_lag_s, reference_jump_deg_per_s : float
-        Lag of the reference's rate [s]; a faster reference steps and has no rate [deg/s].
-    lower, upper : float
-        Bounds of the duty [-].
+    **settings
+        As `fields` lists them.
 
     Raises
     ------
@@ -116,27 +107,13 @@ class Mgdd1:
         *,
         horizon_samples: int = 16,
         delay_samples: int = 1,
-        adaptation_gain: float = 1.0,
-        difference: float = 0.02,
-        error_weight: float = 1.0,
-        duty_change_weight: float = 20.0,
-        trim_rate_per_deg_s: float = 0.3,
-        reference_lag_s: float = 4.5e-3,
-        reference_jump_deg_per_s: float = 400.0,
-        lower: float = -1.0,
-        upper: float = 1.0,
+        **settings: float,
     ) -> None:
-        numbers = {
-            "adaptation_gain": adaptation_gain,
-            "difference": difference,
-            "error_weight": error_weight,
-            "duty_change_weight": duty_change_weight,
-            "trim_rate_per_deg_s": trim_rate_per_deg_s,
-            "reference_lag_s": reference_lag_s,
-            "reference_jump_deg_per_s": reference_jump_deg_per_s,
-            "lower": lower,
-            "upper": upper,
-        }
+        numbers: dict[str, float] = {name: each["default"] for name, each in self.fields().items()} | settings
+        if strange := min(settings.keys() - self.fields().keys(), default=""):
+            known = [*self.fields(), "guide", "horizon_samples", "delay_samples"]
+            remedy = did_you_mean(strange, known) or "fields() has them"
+            raise TypeError(f"Mgdd1() has no argument {strange!r}: {remedy}")
         self._settings: dict[str, Any] = {"horizon_samples": horizon_samples, "delay_samples": delay_samples, **numbers}
         self.guide = guide
         self._core: Any = _made(

@@ -1,4 +1,4 @@
-"""Public data by name: `read` looks for a set in the folder MGDD_DATA_DIR, the package and what was fetched before."""
+"""Public data by name: `read` looks for a set in the folder MGDD_DATA_DIR and in the package."""
 
 from __future__ import annotations
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
-from mgdd.datasets import files
-from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, LICENCES, names, path
+from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, LICENCES, path
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
 from mgdd.io.point_table import read_conditions
@@ -65,26 +64,20 @@ _BURN_ANGLES = ("mfb10_cad", "mfb50_cad", "mfb90_cad")
 
 
 @overload
-def read(name: Literal["hd_diesel_128x144"], *, fetch: bool = ...) -> list[xr.Dataset]: ...
+def read(name: Literal["hd_diesel_128x144"]) -> list[xr.Dataset]: ...
 @overload
-def read(name: Literal["h2df_502"], *, fetch: bool = ..., checked: bool = ..., mask_held: bool = ...) -> xr.Dataset: ...
+def read(name: Literal["h2df_502"], *, checked: bool = ..., mask_held: bool = ...) -> xr.Dataset: ...
 @overload
+def read(name: Literal["advisor_engine_maps"]) -> tuple[xr.Dataset, xr.Dataset]: ...
 def read(
-    name: Literal["advisor_engine_maps", "cascaded_tanks", "emps", "wh2009"], *, fetch: bool = ...
-) -> tuple[xr.Dataset, xr.Dataset]: ...
-def read(
-    name: str, *, fetch: bool = False, checked: bool = True, mask_held: bool = True
+    name: str, *, checked: bool = True, mask_held: bool = True
 ) -> xr.Dataset | list[xr.Dataset] | tuple[xr.Dataset, xr.Dataset]:
     """Read a data set by its name.
 
     Parameters
     ----------
-    name : {"hd_diesel_128x144", "h2df_502", "advisor_engine_maps", "emps", "cascaded_tanks", "wh2009"}
-        The first is in the package; the others belong into ``$MGDD_DATA_DIR/NAME``, or `fetch` gets the last three.
-    fetch : bool
-        Download a set that is not at hand from its public address, check it and keep it, in ``MGDD_CACHE_DIR`` if that
-        is set, else in the cache folder of the user; it needs the package pooch. Nothing is downloaded without it. The
-        attributes of the records name the terms of the data.
+    name : {"hd_diesel_128x144", "h2df_502", "advisor_engine_maps"}
+        The first is in the package; the others belong into ``$MGDD_DATA_DIR/NAME``.
     checked : bool
         Of ``h2df_502``: refuse a file whose SHA-256 is not that of the export described on the page "A measured
         engine"; False reads an export of your own with the same columns.
@@ -104,11 +97,6 @@ def read(
         and slow signals, angles in °CA aTDC; ``excited`` marks the cycles under random steps, ``burn_angles_held``
         the repeats.
     tuple of xarray.Dataset
-        Estimation and test record over ``time_s``. ``emps``: a motor-driven slide with friction in closed loop at
-        1 kHz, ``drive_v`` (controller output, pulses included), ``position_m``, ``reference_m`` and the scalar
-        ``force_n_per_v``. ``cascaded_tanks``: ``pump_v`` and ``level_v`` every 4 s; the level sensor ends at 10 V.
-        ``wh2009``: ``input_v`` and ``output_v`` of the Wiener-Hammerstein circuit of the SYSID benchmark at 51.2 kHz,
-        100 000 and 78 800 samples.
         ``advisor_engine_maps``: the maps of a Volkswagen 1.9 L and a Mercedes 1.7 L diesel at their stock calibration,
         over ``speed_rpm`` and ``torque_nm``: ``bsfc_g_per_kwh`` (not at zero torque), ``nox_g_per_kwh``, flows,
         exhaust and ``attainable``. Above the full-load curve, ``full_load_nm`` as the highest attainable torque of the
@@ -119,9 +107,9 @@ def read(
     FileNotFoundError
         The set is in none of these places; the message states where its files belong.
     mgdd.errors.ParameterError
-        An unknown name, an option of another set, or a set without a public address to fetch.
+        An unknown name, or an option of another set.
     mgdd.errors.DataError
-        A changed file, missing columns or samples; a file that cannot be fetched.
+        A changed file, missing columns or samples.
 
     References
     ----------
@@ -133,12 +121,6 @@ def read(
 
     Markel et al. (2002), ADVISOR: a systems analysis tool for advanced vehicle modeling.
 
-    Janot, Gautier and Brunot (2019), Data Set and Reference Models of EMPS.
-
-    Schoukens and Noël (2017), Three benchmarks addressing open challenges in nonlinear system identification.
-
-    Schoukens, Suykens and Ljung (2009), Wiener-Hammerstein benchmark.
-
     Examples
     --------
     >>> from mgdd import datasets
@@ -148,8 +130,6 @@ def read(
     >>> traces[0].attrs["soi_cad"]
     -5.06
     """
-    if fetch and name not in names():
-        files.fetch(name)
     if name == "h2df_502":
         return _h2df_cycles(checked=checked, mask_held=mask_held)
     if name not in FILES:
@@ -158,13 +138,8 @@ def read(
         raise ParameterError("checked, mask_held: only 'h2df_502' has them")
     if name == HD:
         return _hd_traces()
-    if name == "emps":
-        first, second = (_emps_record(path(name, file)) for file in FILES[name])
-        return first, second
-    if name == ENGINE_MAPS:
-        one, other = (engine_map(path(name, file)) for file in FILES[name])
-        return one, other
-    return _cascaded_tanks() if name == "cascaded_tanks" else _wiener_hammerstein()
+    one, other = (engine_map(path(name, file)) for file in FILES[name])
+    return one, other
 
 
 def _hd_traces() -> list[xr.Dataset]:
@@ -206,80 +181,6 @@ def _h2df_cycles(*, checked: bool, mask_held: bool) -> xr.Dataset:
         if note:
             records[name].attrs["note"] = note
     return records
-
-
-def _emps_record(file: Path) -> xr.Dataset:
-    from scipy.io import loadmat
-
-    content = loadmat(file)
-    missing = [name for name in ("t", "qg", "qm", "vir", "gtau") if name not in content]
-    if missing:
-        raise DataError(f"{file}: lacks {', '.join(missing)}: this is not a record of the EMPS benchmark")
-    n = content["qm"].size
-    return labelled_dataset(
-        {
-            "time_s": ("time_s", np.arange(n) * 1e-3, "s", "time"),  # the stamps differ from this by 20 ns
-            "drive_v": ("time_s", content["vir"].ravel(), "V", "controller output"),
-            "position_m": ("time_s", content["qm"].ravel(), "m", "measured position"),
-            "reference_m": ("time_s", content["qg"].ravel(), "m", "reference position"),
-            "force_n_per_v": ((), float(content["gtau"].item()), "N/V", "drive force per volt"),
-        },
-        attrs={
-            "title": "electro-mechanical positioning system (EMPS)",
-            "file": file.name,
-            "citation": "A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, Workshop on "
-            "Nonlinear System Identification Benchmarks (workshop of 2019)",
-            "licence": LICENCES["emps"],
-        },
-    )
-
-
-def _cascaded_tanks() -> tuple[xr.Dataset, xr.Dataset]:
-    table = read_table(path("cascaded_tanks", *FILES["cascaded_tanks"]))
-
-    def record(pump: str, level: str, title: str) -> xr.Dataset:
-        values = table.numbers(table.index(pump)), table.numbers(table.index(level))
-        return labelled_dataset(
-            {
-                "time_s": ("time_s", np.arange(values[0].size) * 4.0, "s", "time"),
-                "pump_v": ("time_s", values[0], "V", "pump voltage"),
-                "level_v": ("time_s", values[1], "V", "level of the lower tank"),
-            },
-            attrs={
-                "title": f"cascaded tanks with overflow, {title}",
-                "citation": "M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noël, Cascaded tanks benchmark",
-                "licence": LICENCES["cascaded_tanks"],
-            },
-        )
-
-    return record("uEst", "yEst", "estimation"), record("uVal", "yVal", "test")
-
-
-def _wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
-    file = path("wh2009", *FILES["wh2009"])
-    with file.open(encoding="utf-8") as lines:
-        header = lines.readline().strip()
-        if not header.replace('"', "").startswith("uBenchMark,yBenchMark"):
-            raise DataError(f"{file}: begins with {header[:60]!r}: columns uBenchMark, yBenchMark were expected")
-        columns = np.loadtxt(lines, delimiter=",", usecols=(0, 1)).T[:, 5200:184_000]
-    if columns[0].size != 178_800:
-        raise DataError(f"{file}: holds {columns[0].size + 5200} samples: the official split needs 184000")
-
-    def record(rows: slice, title: str) -> xr.Dataset:
-        return labelled_dataset(
-            {
-                "time_s": ("time_s", np.arange(178_800)[rows] / 51_200.0, "s", "time"),
-                "input_v": ("time_s", columns[0][rows], "V", "input of the circuit"),
-                "output_v": ("time_s", columns[1][rows], "V", "output of the circuit"),
-            },
-            attrs={
-                "title": f"Wiener-Hammerstein circuit, {title}",
-                "citation": "J. Schoukens, J. Suykens, L. Ljung, Wiener-Hammerstein benchmark (2009)",
-                "licence": LICENCES["wh2009"],
-            },
-        )
-
-    return record(slice(0, 100_000), "estimation"), record(slice(100_000, None), "test")
 
 
 _AXES = ("speed_rpm", "torque_Nm")

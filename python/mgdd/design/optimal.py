@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LEAST_GAIN = 1e-8  # relative gain in det that is worth an exchange; below it rounding decides
 _SWEEPS = 200

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple, Self
+from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from mgdd._core.engine import Cylinder, OperatingPoint
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 # Distances from TDC that are compared: nearer ones hold the peak alone, farther ones the flows of the valves.
 _FROM_CAD, _TO_CAD, _ROUNDS = 5.0, 60.0, 5

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mgdd._core.engine import Cylinder
 from mgdd.signals.repeats import copies, noise_of, still
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from mgdd._core.engine import Cylinder
 
 # Compression from where the valves are shut to before any burn [°CA aTDC]: smooth, so that its third differences are
 # the noise.

@@ -14,8 +14,6 @@ from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
@@ -29,10 +27,10 @@ class Indicating:
 
     Parameters
     ----------
-    crank_angle_cad : array_like
-        Angles of the samples [°CA aTDC], rising, of the closed part, of 360 or of 720 degrees.
     cylinder : Cylinder, Preset, str or path-like
         Geometry, IVC and EVO.
+    crank_angle_cad : array_like
+        Angles of the samples [°CA aTDC], rising, of the closed part, of 360 or of 720 degrees.
     speed_rpm : float
         Engine speed [rpm], for the band of knock.
     pegging : {"none", "inlet", "two_point", "least_squares"}
@@ -70,7 +68,7 @@ class Indicating:
     >>> import numpy as np
     >>> from mgdd.engine import Indicating
     >>> angle = np.arange(-360.0, 360.0, 0.2)
-    >>> indicating = Indicating(angle, "puma_single", speed_rpm=1500.0)
+    >>> indicating = Indicating("puma_single", angle, speed_rpm=1500.0)
     >>> figures = indicating.cycle(np.where(angle < 0.0, 1.2, 1.5))
     >>> round(figures["pmep_bar"], 3)
     -0.3
@@ -78,8 +76,8 @@ class Indicating:
 
     def __init__(
         self,
-        crank_angle_cad: ArrayLike,
         cylinder: CylinderLike,
+        crank_angle_cad: ArrayLike,
         *,
         speed_rpm: float,
         pegging: str = "none",
@@ -157,7 +155,7 @@ class Indicating:
         --------
         >>> from mgdd.engine import Indicating, simulate
         >>> runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0) for mg in (20.0, 0.0, 21.0)]
-        >>> indicating = Indicating(runs[0]["crank_angle_cad"], "puma_single", speed_rpm=1500.0)
+        >>> indicating = Indicating("puma_single", runs[0]["crank_angle_cad"], speed_rpm=1500.0)
         >>> made = indicating.record([run["pressure_bar"] for run in runs])
         >>> made["misfire"].values.tolist()
         [False, True, False]
@@ -236,7 +234,7 @@ class Indicating:
         >>> import numpy as np
         >>> from mgdd.engine import Indicating
         >>> angle = np.arange(-360.0, 360.0, 0.2)
-        >>> indicating = Indicating(angle, "puma_single", speed_rpm=1500.0)
+        >>> indicating = Indicating("puma_single", angle, speed_rpm=1500.0)
         >>> tone = 20.0 + 0.2 * np.sqrt(2.0) * np.sin(2.0 * np.pi * angle / 9.0)  # 1 kHz; 0.2 bar are 180 dB
         >>> made = indicating.noise([tone], attenuation_db={500.0: 90.0, 2000.0: 70.0})
         >>> round(float(made["noise_level_dba"][0]), 3)

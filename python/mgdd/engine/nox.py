@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd import _core
 from mgdd._core.engine import NoxFit
 from mgdd.errors import ParameterError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 
 _NO2_G_PER_MOL = 46.0055
 # 40 CFR 1065.670: factor = slope times the water of the intake air [mol/mol] + constant.

@@ -242,7 +242,7 @@ def check_pressure(
         figures = analyze(
             made, cylinder, point=point, pegging=pegging, pegging_exponent=pegging_exponent,
             inlet_pressure_kpa=inlet_pressure_kpa, bmep_bar=bmep_bar, brake_torque_nm=brake_torque_nm,
-            n_cylinders=n_cylinders, fuel_mg=fuel_mg, traces=made.sizes.get(CYCLE, 1) == 1, quiet=True,
+            n_cylinders=n_cylinders, fuel_mg=fuel_mg, keep_traces=made.sizes.get(CYCLE, 1) == 1, quiet=True,
         )  # fmt: skip
     except DataError as error:
         return PressureCheck(name, (Check("file", "fail", str(error)),))

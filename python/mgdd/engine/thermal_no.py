@@ -109,7 +109,7 @@ class ThermalNo:
         nox_ppm: ArrayLike,
         cylinder: CylinderLike,
         *,
-        points: Sequence[PointLike] | PointLike | None = None,
+        point: Sequence[PointLike] | PointLike | None = None,
     ) -> ThermalNoFit:
         """Fit the factor, and from four cycles on the mixture, to measured NOx by least squares of ln NOx.
 
@@ -121,7 +121,7 @@ class ThermalNo:
             Measured NOx of each [ppm], wet.
         cylinder : Cylinder, Preset, str or path-like
             The cylinder; or a preset, its name or its file.
-        points : sequence of points, or one
+        point : sequence of points, or one
             Speed and fuel of each cycle, or of all.
 
         Returns
@@ -137,7 +137,7 @@ class ThermalNo:
             Numbers of cycles, points and NOx that differ.
         """
         measured = np.atleast_1d(np.asarray(nox_ppm, dtype=np.float64))
-        each = list(points) if isinstance(points, Sequence) and not isinstance(points, str) else [points] * len(cycles)
+        each = list(point) if isinstance(point, Sequence) and not isinstance(point, str) else [point] * len(cycles)
         if not len(cycles) == measured.size == len(each):
             raise ShapeError(f"{len(cycles)} cycles, {measured.size} values of nox_ppm, {len(each)} points: give alike")
         if not measured.size:

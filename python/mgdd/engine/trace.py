@@ -51,7 +51,7 @@ def analyze(
     brake_torque_nm: float | None = None,
     n_cylinders: int = 1,
     fuel_mg: float | None = None,
-    traces: bool = True,
+    keep_traces: bool = True,
     quiet: bool = False,
 ) -> Dataset:
     """Analyse pressure: pegging, heat release, burn angles, work, polytropic exponents, of one cycle or of many.
@@ -62,9 +62,9 @@ def analyze(
         ``pressure_bar(crank_angle_cad)``, or ``pressure_bar(cycle, crank_angle_cad)`` for a record of cycles, from
         `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`; a table with these columns [°CA aTDC, bar], a
         column over crank angle, angle and pressure as a pair, or a file that `mgdd.io.read_pressure` reads without
-        options; or chunks of a record one after another, as of `mgdd.io.pressure_chunks`, with ``traces=False``: the
-        figures are those of the whole. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k intake_pressure_kpa
-        soi_cad spark_cad bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
+        options; or chunks of a record one after another, as of `mgdd.io.pressure_chunks`, with ``keep_traces=False``:
+        the figures are those of the whole. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k
+        intake_pressure_kpa soi_cad spark_cad bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
@@ -115,7 +115,7 @@ def analyze(
     fuel_mg : float, optional
         Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.83 to 1.18 of its heat is doubted, below a
         compression ratio of 14 outside 0.70 to 1.18.
-    traces : bool
+    keep_traces : bool
         False for the figures of a long record without its traces, which take the memory; the figures are the same.
     quiet : bool
         Leave the warnings to the attribute instead of logging them too.
@@ -172,7 +172,7 @@ def analyze(
     named = stated("fuel_mg", fuel_mg, stated_point)
     fuel_mg = named if named or fuel_mg is not None else None  # a point without fuel is motored
     if isinstance(trace, Iterator):
-        trace, chunks = _first_of(trace, traces=traces)
+        trace, chunks = _first_of(trace, keep_traces=keep_traces)
     else:
         trace = trace if is_of_cycles(trace) else as_trace(trace)
         chunks = iter([trace])
@@ -214,14 +214,15 @@ def analyze(
     try:
         if is_of_cycles(trace):
             result = of_cycles(
-                _noting(chunks, doubted), cylinder, state, options, attrs, given, knock_threshold_bar, traces=traces
-            )
+                _noting(chunks, doubted), cylinder, state, options, attrs, given, knock_threshold_bar,
+                traces=keep_traces,
+            )  # fmt: skip
         elif knock_threshold_bar is not None:
             raise ParameterError("knock_threshold_bar is for a record of cycles, and this is one cycle: leave it out")
-        elif traces:
+        elif keep_traces:
             result = _one(trace, cylinder, state, options, attrs, given)
         else:
-            raise ParameterError("traces = False is for a record of cycles, and this is one cycle: leave it out")
+            raise ParameterError("keep_traces = False is for a record of cycles, and this is one cycle: leave it out")
     except DataError as error:
         if error.field != "bmep_bar" or _number(trace, "brake_torque_nm", brake_torque_nm) is None:
             raise
@@ -237,10 +238,12 @@ def analyze(
     )
 
 
-def _first_of(chunks: Iterator[Any], *, traces: bool) -> tuple[Any, Iterator[Any]]:
+def _first_of(chunks: Iterator[Any], *, keep_traces: bool) -> tuple[Any, Iterator[Any]]:
     """Give the first chunk, and all of them."""
-    if traces:
-        raise ParameterError("traces = True: chunks of a record are analysed for their figures: pass traces=False")
+    if keep_traces:
+        raise ParameterError(
+            "keep_traces = True: chunks of a record are analysed for their figures: pass keep_traces=False"
+        )
     first = next(chunks, None)
     if first is None or not is_of_cycles(first):
         have = "no chunk" if first is None else f"a chunk of type {type(first).__name__}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,8 +18,6 @@ from mgdd.errors import DataError
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import xarray as xr
     from numpy.typing import NDArray
 

@@ -14,7 +14,7 @@ Examples
 >>> from mgdd.loop import VirtualEngine
 >>> rough = ModelOptimum(Cylinder(wall_heat_scale=1.0))  # twice the wall heat of the bench
 >>> curve = rough.curve(OperatingPoint())
->>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
+>>> seeker = CurveSeeking(start=curve.best, bounds=(-30.0, 10.0), curve=curve)
 >>> bench = VirtualEngine(seed=3)
 >>> for _ in range(40):
 ...     seeker.tell(bench.step(seeker.ask()[0])["j"])

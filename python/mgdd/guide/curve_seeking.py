@@ -23,8 +23,8 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
         First input, in its unit; the guide's best input, ``curve.best``, where nothing speaks for another.
     inputs : sequence of Input, or mapping of str to (float, float), optional
         Name, unit, bounds and rate of the input; `ask` then gives a mapping.
-    lower, upper : float
-        Bounds of the applied input, finite, where `inputs` does not say them.
+    bounds : pair of float
+        Least and largest applied input, finite, where `inputs` does not hold them.
     curve : Curve
         J of the guide over the input, to be maximised; it bends down at its best input, which lies in the bounds.
     prior_sd : float, optional
@@ -78,7 +78,7 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     --------
     >>> from mgdd.guide import Curve, CurveSeeking
     >>> rough = Curve.parabola(curvature=-0.05, best=4.0, reach=40.0)  # 10 too late
-    >>> seeker = CurveSeeking(start=rough.best, lower=-30.0, upper=10.0, curve=rough)
+    >>> seeker = CurveSeeking(start=rough.best, bounds=(-30.0, 10.0), curve=rough)
     >>> for _ in range(8):
     ...     soi = seeker.ask()[0]
     ...     seeker.tell(56.0 - 0.0255 * (soi + 6.0) ** 2)

@@ -85,7 +85,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
     >>> from mgdd.optimize import ExtremumSeeking
     >>> def late_by_one(fuel_mg):  # a rough model of the best timing
     ...     return -0.35 * fuel_mg + 1.0
-    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    >>> seeker = ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0))
     >>> guided = FeedForward(seeker, late_by_one, noise_sd=0.1)
     >>> for cycle in range(400):
     ...     fuel_mg = 12.0 if cycle < 300 else 30.0

@@ -73,7 +73,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
     >>> rough = Cylinder(wall_heat_scale=1.0)
     >>> model = ModelOptimum(rough)
     >>> curve = model.curve(bench.point)
-    >>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
+    >>> seeker = CurveSeeking(start=curve.best, bounds=(-30.0, 10.0), curve=curve)
     >>> guided = GuidedEngine(seeker, model, bench.point, calibration=OnlineCalibration(rough))
     >>> run = run_seeker(bench, guided, 80)
     >>> round(guided.cylinder.wall_heat_scale, 1), abs(run.summary["final_soc_cad"] + 5.63) < 1.0

@@ -61,7 +61,7 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
 
     Parameters
     ----------
-    engine : Cylinder, Preset, str or path-like
+    cylinder : Cylinder, Preset, str or path-like
         The guide: a preset, its name, or a cylinder of your own. It is not changed.
     method : {"gauss_newton", "recursive", "extremum_seeking"}
         One exact Gauss-Newton step per update on the last window; the same with earlier windows remembered;
@@ -123,7 +123,7 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
 
     def __init__(
         self,
-        engine: CylinderLike,
+        cylinder: CylinderLike,
         *,
         method: str = "gauss_newton",
         parameters: Sequence[str] = ("wall_heat_scale",),
@@ -141,7 +141,7 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
         if isinstance(parameters, str):
             raise ParameterError.of("parameters", parameters, "a sequence of names")
         super().__init__(
-            cylinder=cylinder_of(engine, "engine"),
+            cylinder=cylinder_of(cylinder),
             method=method,
             parameters=list(parameters),
             uncertainty=dict(uncertainty or {}),
@@ -228,13 +228,6 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
             for name, (knowledge, sentence) in super().verdicts.items()
         }
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Keywords that make this calibration again."""
-        settings = super().settings
-        settings["engine"] = settings.pop("cylinder")
-        return settings
-
     def summary(self) -> str:
         """Say status and verdicts as text.
 
@@ -300,7 +293,7 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
 def _rebuild(
     settings: dict[str, Any], state: dict[str, list[float]], history: list[tuple[str, list[float]]]
 ) -> OnlineCalibration:
-    made = OnlineCalibration(settings.pop("engine"), **settings)
+    made = OnlineCalibration(**settings)
     made.state = state
     made._history = list(history)
     return made

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
+from mgdd.identify.ode_model import Derivative, OdeModel, Output, output_or_first_state, run_in_lockstep
 from mgdd.identify.starts import spread_starts
 from mgdd.optimize import least_squares
 from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of
@@ -19,15 +20,6 @@ from mgdd.results import Fit
 from mgdd.results.fit_report import FitReport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
-
-    from numpy.typing import ArrayLike, NDArray
-
-    Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
-    Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
-
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
@@ -243,8 +235,7 @@ class _Search:
             self.residual,
             list(start.values()),
             names=self.names,
-            lower=self.lower,
-            upper=self.upper,
+            bounds=(self.lower, self.upper),
             log_scaled=self.logs,
             data=self.measured[self.skip :] / self.sigma,
             max_iterations=self.options.max_iterations,

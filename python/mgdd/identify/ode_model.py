@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, entries, wanted
@@ -17,13 +18,8 @@ from mgdd.results.units import unit_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike, NDArray
-
-    Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
-    Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
+Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
+Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 
 _FUNCTIONS = ("derivative", "output")
 _STATE = "unit of the state"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import TIME_UNITS, Heading, heading
@@ -15,9 +16,6 @@ from mgdd.io.pressure_checks import MIN_SAMPLES
 from mgdd.io.reading import ANGLE_UNITS, Reading
 from mgdd.io.table import Table
 from mgdd.io.wrong_channel import no_angle
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # A speed is stated to a digit or read off a display; one that is further off is of another point.
 _CORRECTED = 0.01

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.array_files import of_hdf5, of_matlab, of_netcdf, of_numpy, of_parquet
@@ -25,11 +27,6 @@ from mgdd.io.recorder_files import of_mdf, of_tdms
 from mgdd.io.row_text import parse_number
 from mgdd.io.table import Table, TextTable, read_table, text_table
 from mgdd.results.labels import ANGLE
-
-if TYPE_CHECKING:
-    import os
-
-    from numpy.typing import NDArray
 
 # Arguments that say how the cells of a text or a sheet become columns.
 TEXT = ("delimiter", "decimal", "sheet", "cycle_per_row")

@@ -6,17 +6,15 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
 from mgdd.io.array_table import Columns, Named, Reversed, columns_of, marked
 from mgdd.io.extras import import_extra
 from mgdd.results.labels import ANGLE
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _MISSING = ("_FillValue", "missing_value")
 _MARKS = (*_MISSING, "valid_min", "valid_max", "valid_range", "scale_factor", "add_offset")

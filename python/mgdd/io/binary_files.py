@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import DataError
@@ -11,7 +12,6 @@ from mgdd.io.files import bytes_of, existing_file, write_whole
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
 
     import xarray as xr
 

@@ -6,9 +6,10 @@ import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.angle_column import Angle, angle_of, headings
@@ -19,9 +20,6 @@ from mgdd.io.reading import Reading
 from mgdd.io.table import Table
 from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.results.units import attribute_units
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Kind = Literal["pressure", "fast", "slow", "other"]
 # Of units that no expression of a units library spells so.
@@ -240,14 +238,10 @@ def _channel(
     reserved = name in used or re.fullmatch(r"time_\d+_s", name)
     if reserved or attribute_units(name_units or "-") != attribute_units(units or "-"):
         name = f"{name}_of_file"
-    name = _unused(name, used)
+    tried = itertools.chain([name], (f"{name}_{k}" for k in itertools.count(2)))
+    name = next(each for each in tried if each not in used)
     used.add(name)
     return Channel(name, columns, kind, units, _source(table, columns), time)
-
-
-def _unused(name: str, used: set[str]) -> str:
-    tried = itertools.chain([name], (f"{name}_{k}" for k in itertools.count(2)))
-    return next(each for each in tried if each not in used)
 
 
 def _source(table: Table, columns: Sequence[int]) -> str:

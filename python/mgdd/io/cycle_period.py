@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.io.cycle_phase import COMPRESSION_CAD, DRIFT_CAD, SIGNIFICANT, phases
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 CYCLE_DEG = 720.0
 # Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed stated as half.

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Compression before any burn, a spark-ignited one too [°CA aTDC]: cycles differ there by level and factor alone. It is
 # drawn out towards TDC, where the shift is separable from the factor, while what is left stays noise.

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument
 from mgdd.io.cycle_period import CYCLE_DEG, repetition
 from mgdd.io.cycle_phase import phases
 from mgdd.io.table import Place
 from mgdd.signals.even_grid import wide_steps
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
 SAME_ANGLE = 0.01

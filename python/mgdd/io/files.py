@@ -95,7 +95,7 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) 
         except UnicodeDecodeError as error:
             raise DataError(f"{origin}: damaged UTF-16 at byte {error.start}: write it again, as UTF-8") from error
     if b"\0" in raw:
-        raise _binary(origin)
+        raise DataError(f"{origin}: this is a binary file: export it as text in UTF-8")
     if raw.isascii():
         return raw.decode("ascii")  # a plain copy, which the next one is not
     try:
@@ -110,10 +110,6 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) 
     except UnicodeDecodeError as error:
         byte = f"{raw[error.start]:#x}"
         raise refused(error, f"byte {byte} is neither UTF-8 nor Windows-1252: save it as UTF-8") from error
-
-
-def _binary(origin: str) -> DataError:
-    return DataError(f"{origin}: this is a binary file: export it as text in UTF-8")
 
 
 def parsed(

@@ -6,20 +6,18 @@ The one reader and writer of such files. It knows mappings only; presets, models
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
 from mgdd.io.files import parsed, read_plain_text, write_whole_text
 from mgdd.results.units import unit_of
-
-if TYPE_CHECKING:
-    import os
 
 FORMAT = 1
 FIT_NOTES = ("source", "unidentifiable")  # what a fit says beside its model, in a table [fit] too

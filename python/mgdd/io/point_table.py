@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,6 @@ from mgdd.results.units import attribute_units
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Collection, Sequence
 
     import xarray as xr
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd._arguments import as_floats
 from mgdd.errors import DataError, ShapeError, argument
 from mgdd.io.column_names import check_choice
 from mgdd.io.table import Place
 from mgdd.signals.even_grid import wide_steps
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike, NDArray
 
 CONVENTION = "crank angle is in °CA aTDC: firing TDC = 0, compression negative"
 # An exact integer keeps the value in bar correctly rounded: units per bar here, bar per unit below.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument
 from mgdd.io.angle_column import Angle, angle_of, at_the_speed_of_the_record, headings
@@ -24,10 +25,6 @@ from mgdd.io.pressure_checks import (
 from mgdd.io.reading import Reading
 from mgdd.io.table import Place, Table
 from mgdd.io.wrong_channel import no_pressure
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 # Cycles of one cylinder, fired or not, share their compression; another cylinder has its peak elsewhere.
 _MIN_CORRELATION = 0.5
@@ -89,7 +86,10 @@ def pressure_of(
     unit, unit_of_file = _unit_of_pressure(table, heads, columns, how.pressure_unit, gain=gain is not None)
     values = table.matrix(columns) if values is None else values
     if how.pressure_column is None and len(columns) > 1:
-        _check_alike(table, columns, angle.degrees, values)
+        odd = odd_shape(angle.degrees, values)
+        if odd is not None:
+            names = f"{table.called(columns[odd])} has another shape than {table.called(columns[0])}"
+            raise _doubtful(table, columns, f"may not be cycles of one cylinder ({names})")
     cycles = angle.cycles
     for index, row in zip(columns, values, strict=True):
         looks = no_pressure(row, cycles)
@@ -279,14 +279,6 @@ def choose_pressure(
     if table.header is not None and (len(cylinders) > 1 or len({heads[i].series for i in possible}) > 1):
         raise _doubtful(table, possible, "are of several cylinders" if len(cylinders) > 1 else "have unlike names")
     return possible
-
-
-def _check_alike(table: Table, columns: Sequence[int], degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
-    """Refuse columns of which one differs in shape from the first as no other cycle of the cylinder would."""
-    odd = odd_shape(degrees, rows)
-    if odd is not None:
-        names = f"{table.called(columns[odd])} has another shape than {table.called(columns[0])}"
-        raise _doubtful(table, columns, f"may not be cycles of one cylinder ({names})")
 
 
 def odd_shape(degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> int | None:

@@ -8,15 +8,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.io.array_table import Columns, Named, Samples, columns_of, marked
 from mgdd.io.extras import import_extra
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:

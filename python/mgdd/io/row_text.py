@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd._core import math as core
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _TAB = 9
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.column_names import bare_unit
@@ -18,11 +18,6 @@ from mgdd.io.files import existing_file, read_plain_text
 from mgdd.io.row_text import Rows, cells_of, parse_number
 from mgdd.io.table_head import first_row_of, names_and_units, separator_of, units_filled
 from mgdd.results.units import unit_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _NARROW = 4  # columns

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import itertools
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from mgdd.errors import DataError
 from mgdd.io.column_names import bare_unit, spelled_unit
 from mgdd.io.row_text import Rows, cells_of, parse_number
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _ROWS = 4  # of one width, one below the other, are data
 _HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.io.pressure_checks import MIN_SAMPLES, RADIAN_SPAN
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Two levels hold at least this share of the samples each, so near to an end of the range, and next to none is between.
 _HELD, _NEAR, _BETWEEN = 0.05, 0.08, 0.01

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, argument
 from mgdd.guide import FeedForward, GuidedEngine
+from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
 from mgdd.loop.plant_record import VOID, cycles_to_dataset, steered
+from mgdd.loop.seek_choice import Question
 from mgdd.loop.summary import NOISE_FREE, LoopCriteria, limit_figures, of_first_input, summarize_cycles, with_a_limit
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.optimize import Seeker
@@ -19,12 +22,6 @@ from mgdd.optimize.inputs import named_values
 from mgdd.optimize.seeker_findings import findings_of
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.result import Figures
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from mgdd.loop.plant import Plant
-    from mgdd.loop.seek_choice import Question
 
 
 def run_seeker(
@@ -75,7 +72,7 @@ def run_seeker(
     --------
     >>> from mgdd.loop import VirtualEngine, LoopCriteria, run_seeker
     >>> from mgdd.optimize import ExtremumSeeking
-    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    >>> seeker = ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0))
     >>> run = run_seeker(VirtualEngine(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
     >>> run.summary["cycles_to"] < 400
     True

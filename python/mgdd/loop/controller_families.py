@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd._core.control import Plate
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import ParameterError
 from mgdd.presets.meant import throttle_model_of
-
-if TYPE_CHECKING:
-    from mgdd.throttle.pseudo_wiener import PseudoWiener
+from mgdd.throttle.pseudo_wiener import PseudoWiener
 
 Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
 _SIDES = ("above", "below")

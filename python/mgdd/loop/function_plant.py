@@ -7,17 +7,15 @@ import ctypes
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import by_name_or_number
-
-if TYPE_CHECKING:
-    from mgdd.optimize import Seeker
 
 C_TYPE = ctypes.CFUNCTYPE(
     ctypes.c_int,

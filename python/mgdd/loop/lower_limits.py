@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd.errors import ParameterError, argument
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
-from mgdd.optimize import Limit
+from mgdd.optimize import Input, Limit
 from mgdd.optimize.optimum import limits_of
-
-if TYPE_CHECKING:
-    from mgdd.optimize import Input
 
 _LOWER = "-"
 

@@ -106,7 +106,7 @@ def monte_carlo(
     --------
     >>> from mgdd.loop import VirtualEngine, LoopCriteria, monte_carlo
     >>> from mgdd.optimize import ExtremumSeeking
-    >>> gains = [ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=g) for g in (0.5, 1.0)]
+    >>> gains = [ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0), gain=g) for g in (0.5, 1.0)]
     >>> table = monte_carlo(VirtualEngine(), gains, range(4), cycles=400, criteria=LoopCriteria(optimum=-5.63))
     >>> dict(table.sizes)
     {'bench': 1, 'seeker': 2, 'seed': 4}

@@ -24,7 +24,7 @@ class Measurement:
     Parameters
     ----------
     components : tuple of float
-        Terms of the performance J, to be maximised; none where the plant has no objective of its own.
+        Terms of the objective J, to be maximised; none where the plant has no objective of its own.
     limits : mapping of str to float
         Measured values of limited quantities, by name.
     misfire : bool
@@ -67,7 +67,7 @@ class Plant(Protocol):
     """Takes inputs by name, gives back what was measured.
 
     `VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; so is a class of yours
-    with these members.
+    with these members. One that also has `objective`, weights of quantities by name, names J in figures and texts.
 
     Examples
     --------

@@ -207,7 +207,7 @@ def _run_of(
     *,
     interrupted: bool,
 ) -> LoopRun:
-    dataset = dataset_of(cycles, first, plant.input_names, guided)
+    dataset = dataset_of(cycles, first, plant, guided)
     dataset.attrs |= {"interrupted": int(interrupted), **criteria.attributes(tuple(plant.limit_names), uppers)}
     summary = Figures(summarize_cycles(dataset, criteria))
     return LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
@@ -216,7 +216,7 @@ def _run_of(
 def require_inputs_of(plant: Plant, seeker: object) -> None:
     """ParameterError where a seeker is none of the package, or names other inputs than the plant has."""
     if not isinstance(seeker, Seeker | FeedForward | GuidedEngine | OwnSeeker):
-        must = "a seeker, as ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0); mgdd.loop.seek(plant, inputs, "
+        must = "a seeker, as ExtremumSeeking(start=-10.0, bounds=(-30.0, 10.0)); mgdd.loop.seek(plant, inputs, "
         raise ParameterError.of(
             "seeker", seeker, must + "seeker=...) takes a name, or an object of your own with ask, tell, estimate"
         )

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd import _core
-from mgdd.loop.plant import Measurement
-from mgdd.results.labels import VARIABLES, labelled_dataset
+from mgdd.loop.plant import Measurement, Plant
+from mgdd.results.labels import VARIABLES, Label, labelled_dataset, named_label
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,6 +30,24 @@ FLAGS = {
 OWN_LABELS = {"egr": ("-", "recirculated exhaust gas, share of the charge's mass")}
 
 
+def objective_label(weights: Mapping[str, float]) -> Label:
+    """Give unit and name of J, a sum of weighted quantities; of J itself where it is unknown what it is made of."""
+    if not weights:
+        return VARIABLES["j"]
+    (name, weight), *more = weights.items()
+    first = named_label(name) if weight == 1.0 else Label("unit of J", name)
+    if weight == 1.0 and not more:
+        return first
+    terms = " ".join(f"{each:+g} {term}" for term, each in weights.items())
+    return Label(first.units, terms.removeprefix("+1 ").removeprefix("+"))
+
+
+def weights_of(performance: _core.engine.Performance) -> dict[str, float]:
+    """Give the weights of the quantities in J; none where a term is no plain multiple of one."""
+    plain = all(term.reference == 1.0 and term.above is None for term in performance.terms)
+    return {term.signal: term.weight for term in performance.terms} if plain else {}
+
+
 def cycles_to_dataset(
     bench: _core.loop.VirtualEngine,
     columns: dict[str, Any],
@@ -45,6 +63,7 @@ def cycles_to_dataset(
     for name, values in columns.items():
         flag = ("-", FLAGS[name]) if name in FLAGS and name not in VARIABLES else ()
         variables[name] = ("cycle", values, *OWN_LABELS.get(name, flag))
+    variables["j"] = (*variables["j"][:2], *objective_label(weights_of(settings["performance"])))
     variables["component"] = ("component", terms, "-", "term of the performance")
     variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
     attrs = {"seed": bench.seed, "nox_sensor": settings["nox_sensor"]}
@@ -168,15 +187,15 @@ def steered(
     }
 
 
-def dataset_of(cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapping[str, tuple[Any, ...]]) -> Dataset:
+def dataset_of(cycles: Cycles, first: int, plant: Plant, guided: Mapping[str, tuple[Any, ...]]) -> Dataset:
     """Label what was measured; a plant that counts its cycles numbers them, others from the first."""
     columns = dict(cycles.values)
     count = columns.pop("cycle", None)
     cycle = np.arange(first, first + cycles.j.size) if count is None or not np.isfinite(count).all() else count
     variables: dict[str, tuple[Any, ...]] = {
         "cycle": ("cycle", cycle.astype(np.int64)),
-        **steered(inputs, cycles.estimate, cycles.asked, cycles.applied),
-        "j": ("cycle", cycles.j),
+        **steered(plant.input_names, cycles.estimate, cycles.asked, cycles.applied),
+        "j": ("cycle", cycles.j, *objective_label(getattr(plant, "objective", {}))),
         "misfire": ("cycle", cycles.misfire, "-", FLAGS["misfire"]),
         "void": ("cycle", cycles.void, "-", VOID),
         **guided,

@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, Error, ParameterError, ShapeError
 from mgdd.io.files import existing_file
 from mgdd.io.table import read_table
 from mgdd.results.describe import described
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 @described

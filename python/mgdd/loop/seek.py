@@ -5,24 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mgdd.errors import Interrupted, ParameterError, ShapeError, argument, hinted
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine
 from mgdd.loop.closed_loop import run_seeker, run_until_still, stillness
+from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, OwnSeeker, require_inputs_of
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult, found_by
-from mgdd.optimize import GaussianProcessSeeking, Seeker
+from mgdd.loop.virtual_engine import VirtualEngine
+from mgdd.optimize import ComponentLag, GaussianProcessSeeking, Input, Limit, Seeker
 from mgdd.optimize.inputs import inputs_of, named_values
-
-if TYPE_CHECKING:
-    from mgdd.optimize import ComponentLag, Input, Limit
+from mgdd.presets.meant import cylinder_of
 
 _MOST_CYCLES = 2_000_000
 
@@ -154,6 +154,8 @@ def seek(
             inputs=given, start=started(start, given), limits=sides, noise_sd=noise_sd, delay_cycles=delay_cycles,
             lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
             settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
+            own_model=isinstance(plant, VirtualEngine) and isinstance(guide, EngineGuide)
+            and cylinder_of(guide.cylinder) == plant.settings["cylinder"],
         )  # fmt: skip
         plant_of(plant, asked.inputs, asked.limits)  # before anything is made
         choice = chosen(asked, seeker)
@@ -223,7 +225,7 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
         if not isinstance(plant, Plant):
             raise ParameterError("inputs: the seeker given has no names for them: give their bounds by name")
         require_inputs_of(plant, seeker)
-        low, high = (np.broadcast_to(own[side], seeker.estimate.shape) for side in ("lower", "upper"))
+        low, high = (np.broadcast_to(side, seeker.estimate.shape) for side in own["bounds"])
         bounds = zip(plant.input_names, low.tolist(), high.tolist(), strict=True)
         there = inputs_of({name: (a, b) for name, a, b in bounds})
     held = tuple(own["limits"])

@@ -7,10 +7,11 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError, argument, hinted
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
@@ -29,14 +30,11 @@ from mgdd.optimize import (
     tune,
 )
 
-if TYPE_CHECKING:
-    from mgdd._core.engine import OperatingPoint
-
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
 _PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later
 _OWN_WORDS = (
-    "start", "lower", "upper", "inputs", "limits", "maximize", "seed", "components", "delay_cycles", "lag_cycles",
+    "start", "bounds", "inputs", "limits", "maximize", "seed", "components", "delay_cycles", "lag_cycles",
     "guide", "curve", "limit_curves", "limit_guides",
 )  # fmt: skip
 _PERIODS = 64  # of a dither: 16 time constants of four periods
@@ -74,6 +72,7 @@ class Question:
     seed: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
     point: OperatingPoint | None = None
+    own_model: bool = False  # the guide is what the plant itself is made of
 
     @property
     def late_cycles(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from mgdd.loop.front_result import FrontResult, front_of
 from mgdd.loop.lower_limits import middle_of
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.seek import plant_of, seek_inputs, started
-from mgdd.optimize import GaussianProcessSeeking
+from mgdd.optimize import GaussianProcessSeeking, Input, Limit
 from mgdd.optimize.optimum import limits_of
-
-if TYPE_CHECKING:
-    from mgdd.optimize import Input, Limit
 
 _ENDS = 0.3  # share of the cycles that looks for the best of each objective alone
 _NEAREST = 6
@@ -41,8 +38,8 @@ def seek_front(
     cycles: int = 200,
     limits: Mapping[str, float] | Sequence[Limit] = (),
     delay_cycles: int = 0,
-    weights: int = 5,
-    points: int = 21,
+    n_weights: int = 5,
+    n_points: int = 21,
     seed: int = 0,
 ) -> FrontResult:
     """Seek the front of two objectives, as efficiency and NOx over timing and EGR.
@@ -69,9 +66,9 @@ def seek_front(
         Upper values of measured quantities.
     delay_cycles : int
         Transport delay between the plant and both objectives [cycles].
-    weights : int
+    n_weights : int
         Sums that are sought, the two objectives alone included, 3 to 20.
-    points : int
+    n_points : int
         Of the front, at even distances along it, >= 2.
     seed : int
         Of the seekers; the same seed gives the same run.
@@ -112,8 +109,8 @@ def seek_front(
     least = delay_cycles + max(4 * (len(given) + 1), terms + 3)
     for name, value, low, high in (
         ("delay_cycles", delay_cycles, 0, math.inf),
-        ("weights", weights, 3, 20),
-        ("points", points, 2, math.inf),
+        ("n_weights", n_weights, 3, 20),
+        ("n_points", n_points, 2, math.inf),
         ("cycles", cycles, least, math.inf),
     ):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
@@ -127,11 +124,11 @@ def seek_front(
             inputs=list(given), start=begin, limits=list(wanted), delay_cycles=delay_cycles, seed=seed
         )
 
-    search, log = _Search(seeker, list(signs.values()), weights), list[_Row]()
+    search, log = _Search(seeker, list(signs.values()), n_weights), list[_Row]()
 
     def result(*, interrupted: bool = False) -> FrontResult:
         return front_of(
-            given, signs, wanted, late=delay_cycles, points=points, seed=seed, interrupted=interrupted,
+            given, signs, wanted, late=delay_cycles, points=n_points, seed=seed, interrupted=interrupted,
             applied=np.array([row.applied for row in log]), measured=np.array([row.objectives for row in log]),
             measured_limits=np.array([row.limits for row in log]), weight=np.array([row.weight for row in log]),
             void=np.array([row.void for row in log], np.bool_),

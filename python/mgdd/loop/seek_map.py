@@ -171,7 +171,7 @@ def seek_map(
         driven.require_cells(entries)
     if seeker is None:
         if isinstance(driven, VirtualTestBed) and _is_engine(guide):
-            cylinder = cylinder_of(getattr(guide, "cylinder", guide), "guide")
+            cylinder = cylinder_of(getattr(guide, "cylinder", guide))
             guide, limit_guides = model_of(driven, cylinder, entries, sought, [limit.name for limit in sides])
         seeker = map_seeker(
             inputs, entries, dwell, settings or {}, limits=sides, guide=guide, limit_guides=limit_guides,
@@ -260,7 +260,7 @@ def model_of(
     nodes = {name: np.asarray(entries, np.float64) for name, entries in axes.items()}
     nodes |= {one.name: np.linspace(one.lower, one.upper, _NODES.get(len(inputs), 7)) for one in inputs}
     grid = dict(zip(nodes, np.meshgrid(*nodes.values(), indexing="ij"), strict=True))
-    found = bed.with_engine(cylinder).steady(grid)
+    found = bed.with_cylinder(cylinder).steady(grid)
     shape = tuple(column.size for column in nodes.values())
 
     def over_all(name: str) -> xr.DataArray:

@@ -15,7 +15,7 @@ from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize.inputs import unit_of_input
 from mgdd.results.describe import Row
 from mgdd.results.finding import Finding, findings_html, unique
-from mgdd.results.labels import labelled_dataset, to_jsonable
+from mgdd.results.labels import label_of, labelled_dataset, to_jsonable
 from mgdd.results.result import Result
 from mgdd.results.units import unit_of
 
@@ -60,6 +60,11 @@ class Readings:
         self.width = np.where(np.isfinite(width), width, tried)
         self.counts = ~data["void"].to_numpy().astype(bool)
         self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the quantities that may be limited."""
+        return [str(name) for name in self._data["limit"].values] if "limits" in self._data else []
 
     def limit(self, name: str) -> NDArray[np.float64]:
         """Give the readings of a limit, NaN where the cycle does not count."""
@@ -143,7 +148,7 @@ def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) ->
             "interrupted", (), f"interrupted after {cycles} cycles", "seek(plant, seeker=found.seeker) goes on"
         )
     if not readings.counts.any():
-        yield Finding("no_reading", (), "no cycle gave a reading of J", "look at the plant, or start where it runs")
+        yield Finding("no_reading", (), "no cycle gave a reading", "look at the plant, or start where it runs")
         return
     if cycles < _PER_INPUT * len(inputs):
         remedy = f"take {_PER_INPUT * len(inputs)} cycles at least"
@@ -158,14 +163,14 @@ def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) ->
             yield Finding("moving", (one.name,), text, "go on seeking while the plant runs, or find what moves it")
         elif move > _MOVES:
             text = f"the estimate of {one.name} moved by {move:.0%} of its bounds over the last {len(late)} cycles"
-            yield Finding("not_settled", (one.name,), text, "take more cycles; J may be flat along it")
+            yield Finding("not_settled", (one.name,), text, "take more cycles; the objective may be flat along it")
     for one, value, width in zip(inputs, late[-1], readings.width, strict=True):
         if min(value - one.lower, one.upper - value) <= _EDGE * width:
             side = "lower" if value - one.lower <= _EDGE * width else "upper"
             text = f"the best {one.name} lies at its {side} bound, {getattr(one, side):.6g}"
             yield Finding("at_bound", (one.name,), text, "widen it where the plant allows that")
     if gain.value <= _SURE * gain.sd:
-        text = f"the gain of J over the start, {gain.value:.3g} ± {gain.sd:.2g}, may be noise"
+        text = f"the gain over the start, {gain.value:.3g} ± {gain.sd:.2g}, may be noise"
         yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
 
 
@@ -174,6 +179,10 @@ def _about_limits(readings: Readings, asked: Question, estimates: Mapping[str, M
         names = tuple(measured_names(asked.limits))
         text = f"no start given, and it is unknown where {', '.join(names)} would hold: it began where that was open"
         yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
+    idle = dict.fromkeys(plain_name(name)[0] for name in readings.measured)
+    if names := tuple(name for name in idle if name not in measured_names(asked.limits)):
+        text = f"{', '.join(names)}: measured, but no limit on it is kept"
+        yield Finding("limit_not_kept", names, text, f"a plant only measures: give the value in {argument('limits')}")
     for limit in asked.limits:
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
@@ -191,8 +200,11 @@ def _about_limits(readings: Readings, asked: Question, estimates: Mapping[str, M
 def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> Iterator[Finding]:
     guided, doubts = asked.guide is not None, int(getattr(seeker, "doubts", 0))
     if doubts > 1 + cycles // _PER_DOUBT:
-        text = f"readings were not explained by earlier ones, {doubts} times: J drifts or jumps"
+        text = f"readings were not explained by earlier ones, {doubts} times: the objective drifts or jumps"
         yield Finding("unexplained", (), text, "look at what else changes; the newest readings count")
+    if asked.own_model:
+        text = "the guide is the model that the plant is made of: no engine has so good a guide"
+        yield Finding("own_model", (), text, "change its cylinder, as Cylinder(wall_heat_scale=1.0)")
     if getattr(seeker, "handed_over", False):
         which = "of the guide" if guided else "of a parabola"
         text = f"the shape {which} did not explain the readings, and extremum seeking took over"
@@ -263,8 +275,9 @@ class SeekResult(Result):
             Row(one.name, f"{self.inputs[one.name]:.6g} (from {self.start[one.name]:.6g})", unit_of_input(one))
             for one in self.asked.inputs
         ]
-        rows.append(Row("J", f"{self.value:.6g} ± {self.value_sd:.2g}", "unit of J"))
-        rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", "unit of J"))
+        unit, objective = label_of(self.run.dataset["j"])
+        rows.append(Row(objective, f"{self.value:.6g} ± {self.value_sd:.2g}", unit))
+        rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", unit))
         for limit in self.asked.limits:
             name, side = plain_name(limit.name)
             reading = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
@@ -284,15 +297,15 @@ class SeekResult(Result):
     def dataset(self) -> xr.Dataset:
         """Every cycle as in `LoopRun`, and what was found; seeker, reason and findings as attributes."""
         names = list(self.inputs)
-        unit = "unit of the input"
+        unit, (unit_of_j, objective) = "unit of the input", label_of(self.run.dataset["j"])
         columns: dict[str, tuple[Any, ...]] = {
             "input": ("input", names, "-", "input of the plant"),
             "best": ("input", list(self.inputs.values()), unit, "best input found"),
             "start": ("input", list(self.start.values()), unit, "input at the start"),
-            "value": ((), self.value, "unit of J", "J expected at the best inputs"),
-            "value_sd": ((), self.value_sd, "unit of J", "its standard deviation"),
-            "gain": ((), self.gain, "unit of J", "gain of J over the start"),
-            "gain_sd": ((), self.gain_sd, "unit of J", "its standard deviation"),
+            "value": ((), self.value, unit_of_j, f"{objective} expected at the best inputs"),
+            "value_sd": ((), self.value_sd, unit_of_j, "its standard deviation"),
+            "gain": ((), self.gain, unit_of_j, f"gain of {objective} over the start"),
+            "gain_sd": ((), self.gain_sd, unit_of_j, "its standard deviation"),
         }
         if self.limits:
             measured = [str(name) for name in self.run.dataset["limit"].to_numpy()]

@@ -13,7 +13,7 @@ from mgdd._core.loop import VirtualEngine, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
 from mgdd.loop.lower_limits import both_sides, measured_names, plain_name
-from mgdd.loop.plant_record import OWN_LABELS
+from mgdd.loop.plant_record import OWN_LABELS, objective_label, weights_of
 from mgdd.optimize.optimum import Optimum
 from mgdd.results.labels import labelled_dataset
 
@@ -70,6 +70,7 @@ def steady_map(quiet: VirtualEngine, inputs: ArrayLike | Mapping[str, ArrayLike]
     }
     for name in ("j", *shown, "nox_true_ppm", "nox_soft_ppm", *(("intake_o2_fraction",) if "egr" in names else ())):
         variables[name] = (dims, np.reshape([row[name] for row in rows], shape))
+    variables["j"] = (*variables["j"], *objective_label(weights_of(quiet.settings["performance"])))
     return labelled_dataset(variables)
 
 

@@ -55,7 +55,7 @@ class LoopCriteria:
     --------
     >>> from mgdd.loop import VirtualEngine, LoopCriteria, run_seeker
     >>> from mgdd.optimize import GoldenSection
-    >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
+    >>> seeker = GoldenSection(start=-20.0, bounds=(-30.0, 10.0), noise_sd=0.25)
     >>> run = run_seeker(VirtualEngine(seed=1), seeker, 300, criteria=LoopCriteria(optimum=-5.63))
     >>> run.summary["cycles_to"] < 100
     True

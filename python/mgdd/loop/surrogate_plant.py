@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd._core.optimize import Limit
 from mgdd.errors import DataError, ParameterError, RigError
@@ -16,9 +17,6 @@ from mgdd.results.describe import described
 from mgdd.surrogate.points import farthest_inside
 from mgdd.surrogate.signal_model import decay_of
 from mgdd.surrogate.surrogate import EngineSurrogate
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LEVERAGE = "leverage_share"
 
@@ -96,12 +94,12 @@ class SurrogatePlant:
             raise ParameterError.of("outside", outside, "'flag', 'raise' or 'clamp'")
         if block_cycles < 1:
             raise ParameterError.of("block_cycles", block_cycles, ">= 1")
-        self._weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
-        if not self._weights:
+        self.objective = {objective: 1.0} if isinstance(objective, str) else dict(objective)
+        if not self.objective:
             raise ParameterError("objective = {}: must name at least one signal")
         self.input_names, self.limit_names = tuple(inputs), tuple(limit_names_of(limits))
         signals = list(surrogate.signals)
-        for what, names in (("objective", self._weights), ("limits", [n for n in self.limit_names if n != _LEVERAGE])):
+        for what, names in (("objective", self.objective), ("limits", [n for n in self.limit_names if n != _LEVERAGE])):
             if unknown := [name for name in names if name not in signals]:
                 raise ParameterError(f"{what}: {unknown[0]!r} is not a signal: must be one of {signals}")
         model_inputs = tuple(surrogate.support.inputs)
@@ -151,7 +149,7 @@ class SurrogatePlant:
         applied = dict(zip(support.inputs, point.tolist(), strict=True)) if self._outside == "clamp" else {}
         values = {**reading, _LEVERAGE: float(support.leverage(point[None])[0]) / support.leverage_limit}
         return Measurement(
-            components=tuple(weight * float(reading[name]) for name, weight in self._weights.items()),
+            components=tuple(weight * float(reading[name]) for name, weight in self.objective.items()),
             limits={name: float(values[name]) for name in self.limit_names},
             values={name: float(value) for name, value in reading.items()},
             noise_free_limits={name: self._noise_free.get(name, values[name]) for name in self.limit_names},

@@ -15,7 +15,7 @@ from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError, hinted
 from mgdd.loop.lower_limits import measured_names
 from mgdd.loop.plant import Measurement, checked_inputs
-from mgdd.loop.plant_record import cycles_to_dataset
+from mgdd.loop.plant_record import cycles_to_dataset, weights_of
 from mgdd.loop.steady import find_optimum, limits_to_keep, split_inputs, steady_map
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum, limit_names_of
@@ -46,7 +46,7 @@ class VirtualEngine(_core.loop.VirtualEngine):
 
     Parameters
     ----------
-    engine : Cylinder, Preset, str or path-like
+    cylinder : Cylinder, Preset, str or path-like
         A preset, its name, or a cylinder of your own.
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         Operating point; that of the preset if left out. It must carry fuel.
@@ -55,7 +55,7 @@ class VirtualEngine(_core.loop.VirtualEngine):
     limits : sequence of str, or limits by name or as Limit
         Up to eight indicators to report as limits, NOx by its sensor (``"nox_true_ppm"``, ``"nox_fast_ppm"``, ...),
         ``"t_evo_k"`` (gas temperature at EVO [K], as the exhaust begins to leave), or ``"cov_imep_percent"`` (of the
-        last 50 cycles; 0 at the first).
+        last 50 cycles; 0 at the first). The engine measures them; the values that count are those of the search.
     seed : int
         Of all noise, in [0, 2**64).
     **settings
@@ -86,7 +86,7 @@ class VirtualEngine(_core.loop.VirtualEngine):
 
     def __init__(
         self,
-        engine: CylinderLike = "puma_single",
+        cylinder: CylinderLike = "puma_single",
         point: PointLike | None = None,
         *,
         schedule: Iterable[tuple[int, OperatingPoint]] | None = None,
@@ -98,7 +98,7 @@ class VirtualEngine(_core.loop.VirtualEngine):
             raise ParameterError("point and schedule were both given: name the operating points in one of them")
         if not 0 <= seed < 2**64:
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
-        cylinder, first = engine_of(engine, {} if point is None else point, argument="engine")
+        cylinder, first = engine_of(cylinder, {} if point is None else point)
         try:
             super().__init__(
                 cylinder=cylinder,
@@ -122,6 +122,11 @@ class VirtualEngine(_core.loop.VirtualEngine):
     def limit_names(self) -> tuple[str, ...]:
         """Names of the limited quantities that a cycle reports."""
         return tuple(self.settings["limits"])
+
+    @property
+    def objective(self) -> dict[str, float]:
+        """Weights of the quantities in J by name; empty where a term is not a plain multiple of one."""
+        return weights_of(self.settings["performance"])
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next cycle.

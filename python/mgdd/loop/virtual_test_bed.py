@@ -28,7 +28,7 @@ class VirtualTestBed:
 
     Parameters
     ----------
-    engine : Cylinder, Preset, str or path-like
+    cylinder : Cylinder, Preset, str or path-like
         As of `VirtualEngine`.
     axes : sequence of str
         Numbers of the operating point that are steered, in the order of the axes of a map.
@@ -60,7 +60,7 @@ class VirtualTestBed:
 
     def __init__(
         self,
-        engine: CylinderLike = "puma_single",
+        cylinder: CylinderLike = "puma_single",
         axes: Sequence[str] = ("speed_rpm", "fuel_mg"),
         *,
         point: PointLike | Callable[..., OperatingPoint] | None = None,
@@ -77,7 +77,7 @@ class VirtualTestBed:
                 )
         self._point = point if callable(point) else None
         given = None if callable(point) else point
-        self._cylinder, self._base = engine_of(engine, {} if given is None else given, argument="engine")
+        self._cylinder, self._base = engine_of(cylinder, {} if given is None else given)
         first = VirtualEngine(self._cylinder, self._base, limits=limits, seed=seed, **settings)
         self.limit_names = first.limit_names
         self.input_names = (*self._axes, *first.input_names)
@@ -86,10 +86,10 @@ class VirtualTestBed:
         self._bench: VirtualEngine | None = None
         self._wanted: tuple[float, ...] | None = None
 
-    def with_engine(self, engine: CylinderLike) -> Self:
-        """Give the same test bed with another engine, as a model of it."""
+    def with_cylinder(self, cylinder: CylinderLike) -> Self:
+        """Give the same test bed with another cylinder, as a model of it."""
         return type(self)(
-            engine_of(engine, self._base, argument="engine")[0], self._axes, point=self._point or self._base,
+            engine_of(cylinder, self._base)[0], self._axes, point=self._point or self._base,
             limits=self.limit_names, seed=self._seed, **self._settings,
         )  # fmt: skip
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from mgdd.maps.cdfx import cdfx_blocks, cdfx_text, is_xml
 from mgdd.maps.cells import can_be_name, spoken_name
 from mgdd.maps.dcm import DcmBlock, dcm_blocks, dcm_text
 from mgdd.maps.written import unit_from, unit_to
-
-if TYPE_CHECKING:
-    import os
 
 ENCODINGS = ("utf-8", "latin-1", "cp1252")
 

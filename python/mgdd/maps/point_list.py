@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.array_table import ArrayTable
@@ -18,10 +18,7 @@ from mgdd.maps.cells import cell_at
 from mgdd.maps.plain_grid import number_in, require_two, value_heading
 from mgdd.maps.written import NOT_GIVEN, Heading, heading_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 _SHOWN = 3  # cells that a message names
 _NUMBERED = re.compile(r"(.*?) ?(\d+)")
@@ -44,7 +41,7 @@ def map_of_points(
         made = _of_matrix(table, name, rows, columns)
         if made is not None:
             return made
-    numeric = _numeric(table)
+    numeric = table.numeric(range(table.width))
     numbers = next((labels[k] for k in numeric if parse_number(labels[k], decimal) is not None), None)
     if numbers is not None:
         raise DataError(
@@ -114,10 +111,6 @@ def _of_columns(
         },
         provenance=notes,
     )
-
-
-def _numeric(table: Table) -> list[int]:
-    return table.numeric(range(table.width))
 
 
 def _index(table: Table, label: str | None, what: str) -> int | None:

@@ -10,7 +10,7 @@ Examples
 --------
 >>> from mgdd.optimize import tune
 >>> tuning = tune(0.25, -0.051, distance=12.0, arrival=1.0)
->>> seeker = tuning.seeker(start=-18.0, lower=-30.0, upper=10.0)
+>>> seeker = tuning.seeker(start=-18.0, bounds=(-30.0, 10.0))
 >>> history = seeker.run(lambda soi: 56.0 - 0.0255 * (soi[0] + 6.0) ** 2, 300)
 >>> abs(seeker.estimate[0] + 6.0) < 0.1
 np.True_

@@ -17,8 +17,8 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    lower, upper : float or array_like
-        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+    bounds : pair of float or array_like
+        Least and largest applied input, per input, where `inputs` does not hold them; none without. The start must lie
         inside by `amplitude`.
     form : {"batch", "moving_average", "washout"}
         How the mean of J is removed: regression over one period with the estimate held, mean of the last
@@ -78,7 +78,7 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     Examples
     --------
     >>> from mgdd.optimize import ExtremumSeeking
-    >>> seeker = ExtremumSeeking(start=-18.0, lower=-30.0, upper=10.0)
+    >>> seeker = ExtremumSeeking(start=-18.0, bounds=(-30.0, 10.0))
     >>> for _ in range(400):
     ...     soi = seeker.ask()[0]
     ...     seeker.tell(56.0 - 0.0255 * (soi + 6.0) ** 2)
@@ -100,8 +100,8 @@ class Spsa(Seeker, _core.optimize.Spsa):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    lower, upper : float or array_like
-        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+    bounds : pair of float or array_like
+        Least and largest applied input, per input, where `inputs` does not hold them; none without. The start must lie
         inside by the perturbation (twice that in the second-order form).
     form : {"first_order", "second_order"}
         Two measurements per gradient, or four, with the Hessian.
@@ -172,8 +172,8 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    lower, upper : float or array_like
-        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+    bounds : pair of float or array_like
+        Least and largest applied input, per input, where `inputs` does not hold them; none without. The start must lie
         inside by `difference`.
     step_size : float or array_like, optional
         lambda_c, per input, > 0 [squared unit of the input per unit of J]; 1/abs(J'') is fastest. Without, half of that
@@ -225,8 +225,8 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     ----------
     start : float or mapping
         Estimate before the first decision.
-    lower, upper : float
-        The bracket, finite, where `inputs` does not say it; also the bounds of the applied input.
+    bounds : pair of float
+        The bracket, finite, where `inputs` does not hold it; also the bounds of the applied input.
     noise_sd : float
         Standard deviation of one measurement of J; 0 trusts every comparison.
     significance : float
@@ -255,7 +255,7 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     Examples
     --------
     >>> from mgdd.optimize import GoldenSection
-    >>> seeker = GoldenSection(start=-15.0, lower=-30.0, upper=10.0)
+    >>> seeker = GoldenSection(start=-15.0, bounds=(-30.0, 10.0))
     >>> while not seeker.converged:
     ...     seeker.tell(-0.0255 * (seeker.ask()[0] + 5.6) ** 2)
     >>> seeker.cycle, round(float(seeker.estimate[0]), 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +50,17 @@ def inputs_of(inputs: Any) -> tuple[Input, ...]:
     raise ParameterError(
         f"inputs = {inputs!r}: must map names to bounds, for example {{'soc_cad': (-20.0, 5.0)}}, or be Input objects"
     )
+
+
+def bounds_pair(bounds: Any, names: Sequence[str] = ()) -> tuple[Any, Any]:
+    """Give both sides of bounds, each a number or one per parameter, of pairs by name too; None is no bound."""
+    if isinstance(bounds, Mapping):
+        bounds = tuple(zip(*named_values("bounds", bounds, names), strict=True))
+    given = (None, None) if bounds is None else bounds
+    if isinstance(given, str) or not hasattr(given, "__len__") or len(given) != 2:
+        raise ParameterError.of("bounds", bounds, "a pair (lower, upper), each a number or one per parameter")
+    low, high = given
+    return -math.inf if low is None else low, math.inf if high is None else high
 
 
 def named_values(argument: str, values: Any, names: Sequence[str]) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
+from mgdd.optimize.inputs import bounds_pair
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import NumbersResult
@@ -109,8 +110,8 @@ class IterativeLearning(_core.optimize.IterativeLearning):
         [0.01, 0.99]; 0.2 for ``q_filter``, no filter for ``p``, ``d`` and ``pd``.
     error_weight, input_weight, change_weight : float, optional
         Weights of ``norm_optimal``: 1, 0, and 0.1 times the square of the largest singular value of G.
-    lower, upper : float, optional
-        Bounds of every input.
+    bounds : pair of float, optional
+        Least and largest input of every sample.
     rate : float, optional
         Largest change of the input from sample to sample.
     guard : bool
@@ -150,7 +151,7 @@ class IterativeLearning(_core.optimize.IterativeLearning):
     ...         for fuel, s in zip(fuel_mg, soc)
     ...     ]
     ...     return 9.0 - np.array(ca50)
-    >>> learner = IterativeLearning(np.full(40, -4.0), impulse_response=lag, law="norm_optimal", lower=-20.0, upper=5.0)
+    >>> learner = IterativeLearning(np.full(40, -4.0), impulse_response=lag, law="norm_optimal", bounds=(-20.0, 5.0))
     >>> learner.convergence().monotone
     True
     >>> for _ in range(8):
@@ -175,8 +176,7 @@ class IterativeLearning(_core.optimize.IterativeLearning):
         error_weight: float | None = None,
         input_weight: float | None = None,
         change_weight: float | None = None,
-        lower: float | None = None,
-        upper: float | None = None,
+        bounds: tuple[float | None, float | None] | None = None,
         rate: float | None = None,
         guard: bool = True,
     ) -> None:
@@ -193,8 +193,7 @@ class IterativeLearning(_core.optimize.IterativeLearning):
             "error_weight": error_weight,
             "input_weight": input_weight,
             "change_weight": change_weight,
-            "lower": -np.inf if lower is None else lower,
-            "upper": np.inf if upper is None else upper,
+            **dict(zip(("lower", "upper"), bounds_pair(bounds), strict=True)),
             "rate": np.inf if rate is None else rate,
             "guard": guard,
         }

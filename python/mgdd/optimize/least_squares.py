@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.optimize.inputs import bounds_pair
 from mgdd.results import Fit
 from mgdd.results.fit import FitQuality, n_best_of
 from mgdd.results.fit_report import FitReport
@@ -16,8 +18,6 @@ from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
@@ -30,8 +30,7 @@ def least_squares(
     x0: ArrayLike,
     *,
     names: Sequence[str] | None = None,
-    lower: ArrayLike | None = None,
-    upper: ArrayLike | None = None,
+    bounds: tuple[ArrayLike | None, ArrayLike | None] | None = None,
     log_scaled: ArrayLike | None = None,
     data: ArrayLike | None = None,
     max_iterations: int = 200,
@@ -53,10 +52,10 @@ def least_squares(
         Start, within the bounds.
     names : sequence of str, optional
         Parameter names; x0, x1, ... without.
-    lower, upper : array_like, shape (n,) or scalar, optional
-        Bounds; none without.
+    bounds : pair of array_like, each of shape (n,) or scalar, optional
+        Least and largest values, as `scipy.optimize.least_squares` takes them.
     log_scaled : array_like of bool, shape (n,) or scalar, optional
-        Parameters searched as log(p); they need lower > 0. Everything reported stays in natural units.
+        Parameters searched as log(p); they need lower bounds > 0. Everything reported stays in natural units.
     data : array_like, shape (m,), optional
         What the residual compares with, in its unit; gives `FitReport.nrmse_fit_percent`.
     max_iterations : int
@@ -89,7 +88,7 @@ def least_squares(
     >>> def rosenbrock(x):
     ...     residual = [10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]
     ...     return residual, [[-20.0 * x[0], 10.0], [-1.0, 0.0]]
-    >>> fit = least_squares(rosenbrock, [-1.2, 1.0], names=["a", "b"], upper=[0.5, np.inf])
+    >>> fit = least_squares(rosenbrock, [-1.2, 1.0], names=["a", "b"], bounds=(None, [0.5, np.inf]))
     >>> fit.values.round(6).tolist(), fit.bounds_active.tolist(), str(fit.findings[0])
     ([0.5, 0.25], [1, 0], 'a stands at its upper bound 0.5')
     """
@@ -99,8 +98,7 @@ def least_squares(
         names = [f"x{i}" for i in range(n)]
     elif isinstance(names, str) or len(names) != n:
         raise ShapeError.of("names", names, f"{n} names, one per value of x0")
-    lowers = _per_parameter(-np.inf if lower is None else lower, "lower", n)
-    uppers = _per_parameter(np.inf if upper is None else upper, "upper", n)
+    lowers, uppers = (_per_parameter(side, f"bounds[{k}]", n) for k, side in enumerate(bounds_pair(bounds)))
     logs = _per_parameter(False if log_scaled is None else log_scaled, "log_scaled", n)
     parameters = [
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=bool(log))

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mgdd.errors import DataError, ShapeError
 from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers
 from mgdd.optimize.measured_surface import Surface, fewest, fit_surface, narrowed, span_of, twice_as_wide
 from mgdd.results.finding import Finding
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 _SURE = 2.0  # standard errors
 

@@ -95,8 +95,8 @@ def with_guides(settings: Mapping[str, Any]) -> dict[str, Any]:
         lower, upper = [one.lower for one in inputs], [one.upper for one in inputs]
     else:
         size = np.size(out.get("start", 0.0))
-        lower, upper = (np.broadcast_to(np.asarray(out.get(side, far), np.float64), size).tolist()
-                        for side, far in (("lower", -math.inf), ("upper", math.inf)))  # fmt: skip
+        sides = out.get("bounds", (-math.inf, math.inf))
+        lower, upper = (np.broadcast_to(np.asarray(side, np.float64), size).tolist() for side in sides)
     axes = [np.linspace(low, high, _NODES.get(len(lower), 2)) for low, high in zip(lower, upper, strict=True)]
     for argument, of in (("guide", None), ("limit_guides", [one.name for one in out.get("limits", ())])):
         given = out.get(argument)
@@ -138,8 +138,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         First estimate, in the unit of the input; one to eight inputs. Limits should hold there.
     inputs, maximize
         As of every `Seeker`; a rate of an input bounds what is applied.
-    lower, upper : float or array_like
-        Bounds of the applied input, per input, finite, where `inputs` does not say them.
+    bounds : pair of float or array_like
+        Least and largest applied input, per input, finite, where `inputs` does not hold them.
     noise_sd : float, optional
         Standard deviation of one reading, > 0 [unit of J]; learnt without.
     horizon : float
@@ -269,7 +269,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
             )
             return
         own = self.settings
-        bounds = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
+        bounds = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(*own["bounds"], strict=True))
         away = np.linalg.norm((history["applied"] - at)[fired] / np.ptp(bounds, axis=1), axis=1)
         near = np.flatnonzero(fired)[np.argmin(away)]
         j = float(self.expected) if self.expected_sd > 0.0 else float(history["objective"][near])

@@ -6,7 +6,7 @@ import inspect
 import json
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -23,7 +23,6 @@ from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
 
     import xarray as xr
 
@@ -287,7 +286,7 @@ def encoded(value: Any) -> Any:
         return {"surface": [value.axes, value.values.ravel().tolist()]}
     if isinstance(value, dict):
         return {name: encoded(item) for name, item in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [encoded(item) for item in value]
     return value
 

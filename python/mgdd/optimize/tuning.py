@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.optimize.direct_seekers import ExtremumSeeking, Spsa
-from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers, inputs_of, named_values
+from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers, bounds_pair, inputs_of, named_values
 from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.tuning_forms import check_wish, coupling_of, hessian_of, of_each, per_input, tuned
 
@@ -135,8 +135,7 @@ class Tuning(InputNumbers):
         self,
         *,
         start: PerInput,
-        lower: PerInput = -math.inf,
-        upper: PerInput = math.inf,
+        bounds: tuple[Any, Any] | Mapping[str, tuple[float, float]] | None = None,
         inputs: Mapping[str, tuple[float, float]] | Sequence[_core.optimize.Input] | None = None,
         maximize: bool = True,
         limits: Mapping[str, float] | Sequence[_core.optimize.Limit] = (),
@@ -149,11 +148,12 @@ class Tuning(InputNumbers):
         ----------
         start : float, array_like or mapping of str to float
             First estimate, in the unit of the input and the order of this tuning.
-        lower, upper : float, array_like or mapping of str to float
-            Bounds of the applied input; the start must lie inside by `amplitude`.
+        bounds : pair of float or array_like, or mapping of str to (float, float), optional
+            Least and largest applied input, per input; the start must lie inside by `amplitude`. By name where this
+            tuning has names.
         inputs : mapping of str to (float, float), or sequence of Input, optional
-            Bounds by name, in place of `lower` and `upper`; in any order where this tuning has names. Without, inputs
-            have the names of this tuning.
+            Names and bounds, in place of `bounds`; in any order where this tuning has names. Without, inputs have the
+            names of this tuning.
         maximize : bool
             False to minimise J.
         limits : mapping of str to float, or sequence of Limit
@@ -171,7 +171,7 @@ class Tuning(InputNumbers):
         Examples
         --------
         >>> from mgdd.optimize import tune
-        >>> tune(0.25, -0.051).seeker(start=-15.0, lower=-30.0, upper=10.0)
+        >>> tune(0.25, -0.051).seeker(start=-15.0, bounds=(-30.0, 10.0))
         <ExtremumSeeking cycle 0, estimate [-15.]>
         >>> tuning = tune(0.25, {"soc_cad": -0.06, "egr": -600.0})
         >>> tuning.seeker(start={"soc_cad": -12.0, "egr": 0.3}, inputs={"egr": (0.0, 0.4), "soc_cad": (-25.0, 15.0)})
@@ -180,12 +180,11 @@ class Tuning(InputNumbers):
         given = inputs_of(inputs)
         names = tuple(one.name for one in given)
         if self.inputs and not given:
-            low, high = (named_values("bounds", bound, self.inputs) for bound in (lower, upper))
             names = self.inputs
-            bounds = zip(names, *np.broadcast_arrays(low, high, np.zeros(len(names)))[:2], strict=True)
-            given = tuple(_core.optimize.Input(name, float(a), float(b)) for name, a, b in bounds)
-        elif given and not all(isinstance(bound, float) and math.isinf(bound) for bound in (lower, upper)):
-            raise ParameterError("lower and upper: inputs hold the bounds: leave these out")
+            sides = np.broadcast_arrays(*bounds_pair(bounds, names), np.zeros(len(names)))[:2]
+            given = tuple(_core.optimize.Input(*one) for one in zip(names, *np.asarray(sides).tolist(), strict=True))
+        elif given and bounds is not None:
+            raise ParameterError("bounds: inputs hold them: leave these out")
         if self.inputs and set(names) != set(self.inputs):
             raise ParameterError(f"inputs are {', '.join(names)}: this was tuned for {', '.join(self.inputs)}")
         own = [self.inputs.index(name) for name in names] if self.inputs else slice(None)
@@ -193,7 +192,7 @@ class Tuning(InputNumbers):
         def each(value: Any) -> Any:
             return np.asarray(value)[own].tolist() if np.ndim(value) else value
 
-        space: dict[str, Any] = {"start": start, "lower": lower, "upper": upper}
+        space: dict[str, Any] = {"start": start, "bounds": bounds}
         if given:
             space = {"start": start if isinstance(start, Mapping) else each(start), "inputs": list(given)}
         one = not np.ndim(self.curvature)

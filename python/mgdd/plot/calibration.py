@@ -47,7 +47,9 @@ def calibration_overlay(overlay: xr.Dataset | Result, *, ax: Axes | None = None)
     panel = residual_below(ax, overlay, ANGLE, "residual_bar")
     angle = overlay[ANGLE].to_numpy()
     lines: list[Line2D] = ax.plot(angle, overlay["measured_bar"], ".", color=GREY, markersize=4, label="measured")
-    lines += ax.plot(angle, overlay["model_bar"], "-", color=BLACK, linewidth=1.2, label=_model_name(overlay))
+    burn = str(overlay.attrs.get("burn", "")).replace("_", " ").replace("wiebe", "Wiebe")
+    model = f"model, {burn}" if burn else "model"
+    lines += ax.plot(angle, overlay["model_bar"], "-", color=BLACK, linewidth=1.2, label=model)
     for name, (dash, color) in _EVENTS.items():
         if name in overlay and np.isfinite(overlay[name]):
             at = float(overlay[name])
@@ -88,11 +90,6 @@ def wall_heat_profile(profile: xr.Dataset | Result, *, ax: Axes | None = None) -
     )
     ax.set_ylim(bottom=0.0)
     return finished(ax, profile, "wall_heat_scale", "rmse_percent", [*lines, span], grid=False)
-
-
-def _model_name(overlay: xr.Dataset) -> str:
-    burn = overlay.attrs.get("burn")
-    return f"model, {str(burn).replace('_', ' ').replace('wiebe', 'Wiebe')}" if burn else "model"
 
 
 def tdc_scan(scan: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:

@@ -123,7 +123,12 @@ def _log_pv(dataset: xr.Dataset | Result, ax: Axes | None) -> Axes:
         label = minus(f"{name.removeprefix('n_')} n = {exponent:.3f} ({low:g} to {high:g} °CA aTDC)")
         lines += ax.plot(ends, constant * ends**-exponent, dash, color=color, linewidth=2.4, label=label)
     ax.set(xscale="log", yscale="log")
-    _plain_ticks(ax)
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())
     return finished(ax, dataset, "volume_l", "pressure_bar", lines, columns=1, grid=False)
 
 
@@ -140,12 +145,3 @@ def _name(dataset: xr.Dataset) -> str:
     file = dataset.attrs.get("file")
     long_name = label_of(dataset["pressure_bar"]).long_name
     return f"{long_name}, {file}" if file else long_name
-
-
-def _plain_ticks(ax: Axes) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())

@@ -67,7 +67,7 @@ def cycles(dataset: xr.Dataset | Result, figure: str = "imep_gross_bar", *, ax: 
     >>> from mgdd import plot
     >>> from mgdd.engine import Indicating, simulate
     >>> runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0) for mg in (20.0, 19.6, 20.7)]
-    >>> indicating = Indicating(runs[0]["crank_angle_cad"], "puma_single", speed_rpm=1500.0)
+    >>> indicating = Indicating("puma_single", runs[0]["crank_angle_cad"], speed_rpm=1500.0)
     >>> ax = plot.cycles(indicating.record([run["pressure_bar"] for run in runs]), "ca50_cad")
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('engine cycle', 'CA50, angle of 50 % heat released [°CA aTDC]')

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.patches import Rectangle
 
     from mgdd.results.result import Result
 
@@ -95,6 +94,8 @@ def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = No
     >>> plot.correlation_matrix(fit.to_dataset()).texts[1].get_text()
     '−0.71'
     """
+    from matplotlib.patches import Rectangle
+
     correlation = require("correlation", correlation, ("parameter", "other", "correlation"), "a fit of mgdd.identify")
     names = [str(name) for name in correlation["parameter"].to_numpy()]
     values = correlation["correlation"].transpose("parameter", "other").to_numpy()
@@ -111,13 +112,8 @@ def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = No
             dark = np.isfinite(value) and abs(value) > 0.6
             ax.text(j, i, shown, ha="center", va="center", fontsize=size, color="white" if dark else BLACK)
             if i != j and np.isfinite(value) and abs(value) > _TANGLED:
-                ax.add_patch(_frame(j, i))
+                frame = Rectangle((j - 0.46, i - 0.46), 0.92, 0.92, fill=False, edgecolor=BLACK, linewidth=1.8)
+                ax.add_patch(frame)
     ax.set_xticks(range(n), names, rotation=40, ha="right", rotation_mode="anchor", fontsize="small")
     ax.set_yticks(range(n), names, fontsize="small")
     return ax
-
-
-def _frame(column: int, row: int) -> Rectangle:
-    from matplotlib.patches import Rectangle
-
-    return Rectangle((column - 0.46, row - 0.46), 0.92, 0.92, fill=False, edgecolor=BLACK, linewidth=1.8)

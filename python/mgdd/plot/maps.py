@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +12,6 @@ from mgdd.plot.style import BLACK, BLUE, COLOURS, GREY, ORANGE, axis_label, lege
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes

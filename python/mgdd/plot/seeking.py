@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -71,7 +72,7 @@ def seeking(
     >>> from mgdd.optimize import ExtremumSeeking
     >>> run = run_seeker(VirtualEngine(nox_sensor="none"), ExtremumSeeking(start=-16.0), 60).dataset
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
-    ['soc_cad [°CA aTDC]', 'J [unit of J]']
+    ['soc_cad [°CA aTDC]', 'efficiency [%]']
     """
     run = require("run", run, (), _MADE_BY)
     sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")
@@ -106,7 +107,7 @@ def seeking(
     handles += panels[n].plot(
         cycle, _running_mean(j, mean_cycles), "-", color=ORANGE, linewidth=1.4, label=f"mean of {mean_cycles} cycles"
     )
-    panels[n].set_ylabel(f"J [{label_of(run['j']).units}]")
+    panels[n].set_ylabel(_short(run, "j"))
     if third:
         panels[n + 1].plot(cycle, run[third], color=BLACK, linewidth=0.8)
         if third == _SLOPE:
@@ -135,8 +136,8 @@ def _short(run: xr.Dataset, name: str) -> str:
     if name == _SLOPE:
         return f"slope [{label_of(run[name]).units}]"
     label = label_of(run[name])
-    long_name = label.long_name.replace(", ", ",\n")
-    return f"{long_name} [{label.units}]"
+    long_name = re.sub(r"(,) | (?=[+-]\d)", r"\1\n", label.long_name)  # parts of a name, terms of a sum
+    return f"{long_name} [{label.units}]".replace("\n-", "\n−")
 
 
 def _limit_label(run: xr.Dataset, names: list[str]) -> str:

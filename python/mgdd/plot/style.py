@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd._arguments import shown
@@ -10,8 +11,6 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, label_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,8 +12,6 @@ from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, divide, finis
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D

@@ -18,7 +18,7 @@ PointLike = str | os.PathLike[str] | Preset | OperatingPoint | Mapping[str, floa
 ThrottleLike = str | os.PathLike[str] | Preset | Throttle
 
 
-def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
+def cylinder_of(given: Any) -> Cylinder:
     """Return the cylinder that is meant by one, a preset of an engine, its name, its ``.toml`` file, or a fit."""
     meant = _loaded(given, "engine")
     if isinstance(meant, Preset):
@@ -26,7 +26,7 @@ def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
     meant = getattr(meant, "model", meant)  # of a fit
     if isinstance(meant, Cylinder):
         return meant
-    raise _refusal(argument, given, "a Cylinder", "engine")
+    raise _refusal("cylinder", given, "a Cylinder", "engine")
 
 
 def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoint | None:
@@ -53,12 +53,10 @@ def stated(name: str, keyword: float | None, point: Any) -> float | None:
     )  # fmt: skip
 
 
-def engine_of(
-    cylinder: Any, point: Any = None, *, argument: str = "cylinder", **fields: float | None
-) -> tuple[Cylinder, OperatingPoint]:
+def engine_of(cylinder: Any, point: Any = None, **fields: float | None) -> tuple[Cylinder, OperatingPoint]:
     """Return the cylinder and the operating point that are meant; numbers by name replace those of the nominal one."""
     meant = _loaded(cylinder, "engine")
-    engine, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
+    engine, nominal = cylinder_of(meant), meant.point if isinstance(meant, Preset) else OperatingPoint()
     changes = {name: value for name, value in fields.items() if value is not None}
     for name, value in changes.items():
         stated(name, value, point)

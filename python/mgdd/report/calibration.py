@@ -17,7 +17,7 @@ from mgdd.identify.engine.family import Member
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, Load, figures_of, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, listed, pegged
-from mgdd.parallel.finished import hand_over
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.presets.meant import cylinder_of, point_of
 from mgdd.report.calibration_page import draw, move_of, sections_of
 from mgdd.report.report import Report
@@ -103,7 +103,7 @@ def calibration_report(
     inputs: dict[str, Any] = {"point": point, "fuel_heat_j": fuel_heat_j, "progress": step}
     step("analyse the traces")
     analyses = [analyze(trace, cylinder, point=point, quiet=True) for trace in absolute]
-    timing, stop = _timing(absolute, cylinder, **inputs, **scheme)
+    timing, stop = or_partial(lambda: best_timing(absolute, cylinder, **inputs, **scheme))
     main = headline_of(timing)
     fits, scans = [main.fit], dict[str, WallHeatProfile]()
     tdc: TdcEstimate | None = None
@@ -144,16 +144,6 @@ def shipped_report(**options: Any) -> Report:
     preset = presets.load("hd_diesel_128x144")
     shipped = datasets.read("hd_diesel_128x144")
     return calibration_report(shipped, preset.cylinder, point=preset.point, data=_PROVENANCE, **options)
-
-
-def _timing(*traces: Any, **options: Any) -> tuple[list[BestTiming], Interrupted | None]:
-    """Find the best timing by all models, or by those that were finished before Ctrl-C."""
-    try:
-        return best_timing(*traces, **options), None
-    except Interrupted as stop:
-        if stop.partial is None:
-            raise
-        return stop.partial, stop
 
 
 def _profiles(main: Member, progress: Callable[[str], None]) -> dict[str, WallHeatProfile]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,6 @@ from mgdd.report.sections import Section, Table, as_number
 from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure

@@ -46,6 +46,11 @@ class AroundPlant:
         return self.plant.limit_names
 
     @property
+    def objective(self) -> Mapping[str, float]:
+        """Weights of the quantities in J, by name; empty where the plant does not say."""
+        return getattr(self.plant, "objective", {})
+
+    @property
     def operating_point_changes(self) -> bool:
         """Whether the next cycle brings a new operating point; False for a plant that announces none."""
         return bool(getattr(self.plant, "operating_point_changes", False))
@@ -171,7 +176,7 @@ class ActuatorGuard(AroundPlant):
     >>> guard = ActuatorGuard(
     ...     bench, start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)}, limits=[Limit("p_max_bar", 80.0)]
     ... )
-    >>> run = run_seeker(guard, ExtremumSeeking(start=0.0, lower=-30.0, upper=10.0), 400)
+    >>> run = run_seeker(guard, ExtremumSeeking(start=0.0, bounds=(-30.0, 10.0)), 400)
     >>> guard.counts["limit"] > 0, float(run.dataset["applied"][:, 0].min()) >= -12.0
     (True, True)
     """

@@ -6,18 +6,16 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
 from mgdd.rig.base import AroundPlant, OpenOnce, Rig
 from mgdd.rig.recorded import RecordedRun, readable_record
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 TABLE = "rig"  # of a record, with a row per exchange
 _PARTS = ("input", "component", "limit", "value", "noise_free", "applied")

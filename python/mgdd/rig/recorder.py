@@ -10,17 +10,15 @@ import uuid
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd._core.rig import Frame, RecordWriter
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.results.labels import to_jsonable
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _OWN = "time_s"
 

@@ -6,12 +6,10 @@ written twice. No model of what was measured is needed, and a copy with new nois
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from numpy.typing import NDArray
 
 # Two windows are alike at random once in a thousand records; a window has this many samples at least, and changes.
 _FALSE_ALARM, _WINDOW, _CHANGES = 1e-3, 64, 8

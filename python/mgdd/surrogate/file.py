@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted, written
@@ -13,9 +14,6 @@ from mgdd.results.labels import Label
 from mgdd.surrogate.polynomial import PolynomialBasis, PolynomialSurface, Support
 from mgdd.surrogate.process import ProcessSurface
 from mgdd.surrogate.signal_model import SensorLag, SignalModel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LARGEST_COUNT = 1_000_000
 _SIGNAL = "signal_"

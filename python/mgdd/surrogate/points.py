@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import Label, label_of, named_label
 from mgdd.signals.model import columns_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MOST_FACTORS = 6  # of a hull: its facets grow beyond all memory with more
 EDGE = 1e-9  # of a range: a point so far outside of a boundary lies on it

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
 from mgdd.io.extras import import_extra
 from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
 
 _NUGGET = 1e-10  # of the signal variance: keeps a noise-free covariance positive
 

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import DataError
 from mgdd.results.describe import described
 from mgdd.results.labels import Label
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
 # Trial time constants [cycles]; the best is refined by a parabola through its neighbours.
 _TAUS = np.r_[0.0, np.geomspace(0.5, 40.0, 36)]
@@ -84,7 +80,11 @@ def find_sensor_lag(
     terms: NDArray[np.float64], values: NDArray[np.float64], use: NDArray[np.bool_], *, max_delay: int, seed: int = 0
 ) -> SensorLag:
     """Find delay and time constant; `use` marks the rows of the log that count."""
-    blocks = _blocks(use)
+    edges = range(0, use.size, _BLOCK)
+    parts = [np.flatnonzero(use[start : start + _BLOCK]) + start for start in edges]
+    blocks = [part for part in parts if part.size]
+    if len(blocks) < 4:
+        raise DataError(f"{int(use.sum())} usable cycles: a sensor lag needs more than {3 * _BLOCK}")
     delays = np.arange(max_delay + 1)
     grams = np.empty((delays.size, _TAUS.size, len(blocks), terms.shape[1] + 1, terms.shape[1] + 1))
     for at, tau in enumerate(_TAUS):
@@ -116,15 +116,6 @@ def find_sensor_lag(
         total_stderr_cycles=float(np.std(many + taus, ddof=1)),
         at_bound=bool(delay == max_delay or tau >= _TAUS[-1]),
     )
-
-
-def _blocks(use: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    edges = range(0, use.size, _BLOCK)
-    parts = [np.flatnonzero(use[start : start + _BLOCK]) + start for start in edges]
-    blocks = [part for part in parts if part.size]
-    if len(blocks) < 4:
-        raise DataError(f"{int(use.sum())} usable cycles: a sensor lag needs more than {3 * _BLOCK}")
-    return blocks
 
 
 def _costs(gram: NDArray[np.float64]) -> NDArray[np.float64]:

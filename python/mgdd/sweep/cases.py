@@ -7,19 +7,16 @@ import math
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd._arguments import shown
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError, argument, did_you_mean
 from mgdd.results.labels import VARIABLES, Label
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 _TIMING = "soc_cad"
 _REMARK = re.compile(r"[,;] (0|none) = .*")  # what a value stands for is not a name for an axis
@@ -138,14 +135,14 @@ class Cases:
         return variables
 
 
-def cases_of(over: Any, *, points: bool) -> Cases:
-    """Read what a sweep goes over: a mapping of axes, or with `points` of columns, or a Dataset over `POINT`."""
+def cases_of(over: Any, *, pointwise: bool) -> Cases:
+    """Read what a sweep goes over: a mapping of axes, or with `pointwise` of columns, or a Dataset over `POINT`."""
     numbers = None
     if hasattr(over, "data_vars"):
         if tuple(over.sizes) != (POINT,):
             raise ShapeError(f"over: a Dataset must be over {POINT!r} alone, this one has {dict(over.sizes)}")
         numbers = np.asarray(over[POINT].to_numpy()) if POINT in over.coords else None
-        points, over = True, over.data_vars
+        pointwise, over = True, over.data_vars
     if not hasattr(over, "keys") or not len(list(over.keys())):
         raise ParameterError.of(
             "over",
@@ -153,13 +150,13 @@ def cases_of(over: Any, *, points: bool) -> Cases:
             "a mapping of at least one input to its values, as {'soc_cad': [-10.0, -5.0]}, or a design",
         )
     inputs = {str(name): _values(str(name), over[name]) for name in over.keys()}  # noqa: SIM118 - a DataFrame too
-    if not points:
+    if not pointwise:
         for name, values in inputs.items():
             _require_different(name, values)
         return Cases(inputs, None)
     lengths = {name: len(values) for name, values in inputs.items()}
     if len(set(lengths.values())) > 1:
-        raise ShapeError(f"over: points need columns of one length, these have {lengths}; leave points out for a grid")
+        raise ShapeError(f"over: points need columns of one length, these have {lengths}; a grid is without pointwise")
     return Cases(inputs, np.arange(next(iter(lengths.values()))) if numbers is None else numbers)
 
 

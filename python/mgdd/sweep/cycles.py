@@ -126,10 +126,10 @@ def sweep(
     point: PointLike | Mapping[str, ArrayLike] | xr.Dataset | None = None,
     over: Mapping[str, ArrayLike] | xr.Dataset | None = None,
     *,
-    points: bool = False,
+    pointwise: bool = False,
     soc_cad: float = -6.0,
     outputs: str | Sequence[str] | None = None,
-    traces: bool | str | Sequence[str] = False,
+    keep_traces: bool | str | Sequence[str] = False,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
     nox: NoxProxy | None = None,
@@ -151,13 +151,13 @@ def sweep(
         Values by input: ``soc_cad``, ``burn_duration_cad``, ``trapped_mass_g``, and every field of cylinder and point
         that is a number. Each is one dimension of a grid, in the order given. A Dataset over ``point``, as
         `mgdd.design` gives it, is a list of points.
-    points : bool
+    pointwise : bool
         `over` is a list of points: columns of one length.
     soc_cad : float
         Start of combustion where it is not swept [°CA aTDC].
     outputs : str or sequence of str, optional
         Indicators and NOx proxies that are wanted; all of them if left out. Fewer need less memory.
-    traces : bool, str or sequence of str
+    keep_traces : bool, str or sequence of str
         Names of traces that are wanted as well; True for all of `mgdd.engine.simulate` but the motored pressure.
     nox : NoxProxy, optional
         Constants of the NOx maps; the defaults are plausible, not of any engine.
@@ -196,14 +196,16 @@ def sweep(
     if over is None:
         point, over = None, point
     cylinder, point = engine_of(cylinder, point)
-    cases = cases_of(over, points=points)
+    cases = cases_of(over, pointwise=pointwise)
     request = Request(
         cylinder=cylinder,
         point=point,
         soc_cad=soc_cad,
         names=tuple(cases.names),
         outputs=_chosen("outputs", outputs, [*_core.engine.indicator_units(), *NOX]),
-        traces=_chosen("traces", None if traces is True else () if traces is False else traces, TRACES),
+        traces=_chosen(
+            "keep_traces", None if keep_traces is True else () if keep_traces is False else keep_traces, TRACES
+        ),
         step_cad=step_cad,
         integrator=integrator,
         nox=NoxProxy() if nox is None else nox,
@@ -300,7 +302,7 @@ def _angles(request: Request) -> NDArray[np.float64]:
         return np.empty(0)
     for name in _GRID_MOVES:
         if name in request.names:
-            raise ParameterError(f"traces: not over {name}, which moves their crank angles; sweep once per value")
+            raise ParameterError(f"keep_traces: not over {name}, which moves their crank angles; sweep once per value")
     return angles_of(request)
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
 from mgdd.presets.meant import ThrottleLike, throttle_model_of
 from mgdd.throttle.pseudo_wiener import PseudoWiener
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # The order of the core's state; angles of motor and gear at plate scale, then of the plate.
 _STATES = (

@@ -136,10 +136,10 @@ def drive_inverse_dynamics(
 
     Examples
     --------
-    >>> from mgdd import datasets
+    >>> from mgdd_studies.benchmarks import records
     >>> from mgdd_studies.benchmarks.drive_axis import drive_inverse_dynamics
-    >>> if "emps" in datasets.names():
-    ...     found = drive_inverse_dynamics(datasets.read("emps")[0], directional=False)
+    >>> if "emps" in records.names():
+    ...     found = drive_inverse_dynamics(records.read("emps")[0], directional=False)
     ...     assert round(found["mass_kg"], 1) == 95.1
     """
     from scipy.signal import butter, filtfilt
@@ -188,10 +188,10 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
 
     Examples
     --------
-    >>> from mgdd import datasets
+    >>> from mgdd_studies.benchmarks import records
     >>> from mgdd_studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics
-    >>> if "emps" in datasets.names():
-    ...     train, test = datasets.read("emps")
+    >>> if "emps" in records.names():
+    ...     train, test = records.read("emps")
     ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
     ...     assert drive_free_run(slide, test).size == 24821
     """
@@ -219,7 +219,7 @@ def fit_drive(
     ----------
     record : xarray.Dataset
         ``drive_v`` [V], ``position_m`` [m] over an evenly spaced ``time_s`` [s], and ``force_n_per_v``, as
-        `mgdd.datasets.read` returns ``emps``.
+        `mgdd_studies.benchmarks.records.read` returns ``emps``.
     friction : str
         ``coulomb``: viscous and Coulomb friction and an offset; ``directional``: another viscous friction in each
         direction; ``stiction``: that, and more friction at rest than in motion; ``stribeck``: the same with a gradual

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import new_figure, residual_below
@@ -19,6 +18,7 @@ from mgdd.signals import nrmse_fit_percent
 from mgdd.signals.metrics import rmse
 from mgdd_studies.base import Parts, Progress, StudyResult
 from mgdd_studies.benchmarks.drive_axis import drive_free_run, fit_drive
+from mgdd_studies.benchmarks.records import read
 from mgdd_studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd_studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
 
@@ -123,9 +123,9 @@ def run_identification_benchmarks(
 
     Examples
     --------
-    >>> from mgdd import datasets
+    >>> from mgdd_studies.benchmarks import records
     >>> from mgdd_studies.benchmarks.identification_benchmarks import run_identification_benchmarks
-    >>> if "cascaded_tanks" in datasets.names():
+    >>> if "cascaded_tanks" in records.names():
     ...     result = run_identification_benchmarks(quick=True, figures=False)
     ...     assert {"set", "train", "test"} <= set(result.summary["rows"][0])
     """
@@ -137,7 +137,7 @@ def run_identification_benchmarks(
     parts, missing, reason = [], [], ""
     for name, make in makers.items():
         try:
-            train, test = datasets.read(name)
+            train, test = read(name)
         except FileNotFoundError as error:
             missing.append(name)
             reason = str(error.strerror)

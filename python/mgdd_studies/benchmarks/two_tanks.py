@@ -189,11 +189,11 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
 
     Examples
     --------
-    >>> from mgdd import datasets
+    >>> from mgdd_studies.benchmarks import records
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd_studies.benchmarks.two_tanks import fit_two_tanks
-    >>> if "cascaded_tanks" in datasets.names():
-    ...     fit = fit_two_tanks(datasets.read("cascaded_tanks")[0], options=FitOptions(n_starts=1))
+    >>> if "cascaded_tanks" in records.names():
+    ...     fit = fit_two_tanks(records.read("cascaded_tanks")[0], options=FitOptions(n_starts=1))
     ...     assert fit.train.rmse < 0.16
     """
     if form not in _FORMS:

@@ -183,11 +183,11 @@ class WienerHammersteinFit(Fit):
 
     Examples
     --------
-    >>> from mgdd import datasets
+    >>> from mgdd_studies.benchmarks import records
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd_studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
-    >>> if "wh2009" in datasets.names():
-    ...     some = datasets.read("wh2009")[0].isel(time_s=slice(0, 5000))
+    >>> if "wh2009" in records.names():
+    ...     some = records.read("wh2009")[0].isel(time_s=slice(0, 5000))
     ...     options = FitOptions(max_iterations=10)
     ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, options=options)
     ...     assert fit.train.rmse <= fit.linear.rmse
@@ -226,10 +226,10 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
 
     Examples
     --------
-    >>> from mgdd import datasets
+    >>> from mgdd_studies.benchmarks import records
     >>> from mgdd_studies.benchmarks.wiener_hammerstein import fit_linear
-    >>> if "wh2009" in datasets.names():
-    ...     assert fit_linear(datasets.read("wh2009")[0], order=2, iterations=3).rmse > 0.04
+    >>> if "wh2009" in records.names():
+    ...     assert fit_linear(records.read("wh2009")[0], order=2, iterations=3).rmse > 0.04
     """
     if not 1 <= order <= 10:
         raise ParameterError.of("order", order, "in [1, 10]")

@@ -1,6 +1,7 @@
-// Numbers as text, names of enumerators, exact units and the error tree.
+// Texts, names and errors: short, exact, and a field that stays in its context.
 #include <cmath>
 #include <limits>
+#include <variant>
 
 #include <gtest/gtest.h>
 
@@ -97,6 +98,16 @@ TEST(CommonText, UnitsOfTheFieldAreExact) {
   EXPECT_EQ(units::pa_per_bar * units::m3_per_l, 100.0);  // bar L = 100 J
   EXPECT_EQ(units::pa_per_kpa * units::m3_per_l, 1.0);    // kPa L = 1 J
   EXPECT_EQ(units::rad_per_deg * 180.0, std::numbers::pi);
+}
+
+TEST(Error, KeepsItsFieldInContext) {
+  const ShapeError inner = about("duty", ShapeError("duty has 3 samples: angle_deg has 4"));
+  EXPECT_EQ(inner.field, "duty");
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(inner.value));
+  const ShapeError outer = in_context("record 2: ", inner);
+  EXPECT_STREQ(outer.what(), "record 2: duty has 3 samples: angle_deg has 4");
+  EXPECT_EQ(outer.field, "duty");
+  EXPECT_EQ(within("fit", inner).field, "fit.duty");
 }
 
 }  // namespace

@@ -14,7 +14,6 @@
 #include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
-#include "mgdd/throttle/models/smooth.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "support/no_alloc.hpp"
 #include "support/respond.hpp"
@@ -123,7 +122,6 @@ TEST(ModelContract, ThrottleModelsOnEveryScalar) {
     p.frame.delay_samples = delay;
     expect_one_law(from_family(PseudoWienerFamily<PwP>{p}, values_of(p), std::array{20.0}, 1e-3), u, 1e-3);
   }
-  expect_one_law(from_family(Rk4<SmoothPlant>{}, smooth_plant_example, std::array{0.3, 0.0, 0.0}, 1e-3), u, 1e-2);
 }
 
 template <class T>
@@ -222,11 +220,7 @@ TEST(Contract, AScalarThatIsLeftOutIsSeen) {
   EXPECT_FALSE((on_every_scalar<LacksOne<Lanes<8>>>));
 }
 
-// A model of any smooth equation does not know a state at rest for an output.
 TEST(Contract, ARequirementThatIsNotMetIsSeen) {
-  using Smooth = decltype(Rk4<throttle::SmoothPlant>{}.prepare<double>(throttle::smooth_plant_example, 1e-3));
-  EXPECT_TRUE(DiscreteModel<Smooth>);
-  EXPECT_FALSE(StartsAtRest<Smooth>);
   EXPECT_TRUE(StartsAtRest<throttle::PwRModel>);
   EXPECT_FALSE(DiscreteModel<double>);
 }

@@ -1,10 +1,16 @@
-// Burn laws: limits, closed forms, inverse, and the slope by quadrature.
-#include "mgdd/engine/burn.hpp"
-
+// Burn laws, and the burn that a trace shows.
+#include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "mgdd/engine/burn.hpp"
+#include "mgdd/engine/charge.hpp"
+#include "mgdd/engine/pressure/burn_window.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
+#include "support/engine_case.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -90,6 +96,119 @@ TEST(EngineBurn, DoubleWiebeIsTheWeightedSum) {
   c.burn.burn_shape = BurnShape::wiebe;
   const Burn<double> plain(c.burn, -6.0, 20.0);
   EXPECT_DOUBLE_EQ(one.fraction(3.3), plain.fraction(3.3));
+}
+
+using test_support::EngineCase;
+
+struct Trace {
+  std::vector<double> angle, pressure, volume;
+};
+Trace trace(const EngineCase& c, double noise_bar = 0.0, double angle_error = 0.0, unsigned seed = 1) {
+  const auto cycle = run(c);
+  Trace t{cycle.angles(), cycle.pressures_bar(), {}};
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  for (double& p : t.pressure)
+    p += noise_bar * noise(random);
+  for (double& a : t.angle)
+    a += angle_error;
+  for (const double a : t.angle)
+    t.volume.push_back(1e3 * Geometry<double>(c.cylinder.geometry).volume_m3(a));
+  return t;
+}
+
+// A triangle burns from SOC over the burn duration. Its last 1 % of the rate is its last 0.25 CAD.
+TEST(EngineBurnWindow, FindsStartAndEndOfATriangle) {
+  for (const double soc : {-38.0, -20.0, -6.0, 5.0}) {
+    EngineCase c("burn_duration_cad=50 step_cad=0.5 wall_heat_scale=0.7");
+    c.soc_cad = soc;
+    for (const double noise : {0.0, 0.05}) {
+      const Trace t = trace(c, noise);
+      const BurnWindow b = find_burn(t.angle, t.pressure, t.volume, {});
+      ASSERT_TRUE(b.found);
+      EXPECT_NEAR(b.start_cad, soc, 3.0) << soc;
+      EXPECT_GT(b.start_cad, soc - 1.5) << soc;  // never long before it
+      EXPECT_NEAR(b.end_cad, soc + 50.0, 8.0) << soc;
+    }
+  }
+}
+
+TEST(EngineBurnWindow, NothingIsFoundBeforeTheStatedInjection) {
+  const EngineCase c("soc_cad=-20 step_cad=0.5");
+  const Trace t = trace(c);
+  EXPECT_LT(find_burn(t.angle, t.pressure, t.volume, {}).start_cad, -17.0);
+  const BurnWindow late = find_burn(t.angle, t.pressure, t.volume, -12.0);
+  EXPECT_GE(late.start_cad, -12.0);
+  EXPECT_EQ(late.unbounded_start_cad, find_burn(t.angle, t.pressure, t.volume, {}).start_cad);
+  // An injection 22 CAD before TDC written as +22 would cut the burn: it is doubted.
+  TraceOptions o;
+  o.earliest_burn_cad = 22.0;
+  const auto told = [&] {
+    const auto a = analyze_trace(t.angle, t.pressure, c.cylinder, c.point, o);
+    return std::count_if(a.warnings.begin(), a.warnings.end(),
+                         [](const TraceWarning& w) { return w.kind == "early_burn"; });
+  };
+  EXPECT_EQ(told(), 1);
+  o.earliest_burn_cad = -22.0;
+  EXPECT_EQ(told(), 0);
+}
+
+TEST(EngineBurnWindow, AMotoredTraceHasNone) {
+  for (const char* settings : {"fuel_mg=0", "fuel_mg=0 wall_heat_scale=1.5 speed_rpm=800"}) {
+    const Trace t = trace(EngineCase(settings), 0.05);
+    EXPECT_FALSE(find_burn(t.angle, t.pressure, t.volume, {}).found) << settings;
+  }
+}
+
+// Without heat p V^n is the same on both strokes: no step, and the offset is the one that was put in.
+TEST(EngineStrokes, AnAdiabaticMotoredTraceGivesTheOffsetThatWasPutIn) {
+  for (const double error : {-3.0, -0.4, 0.0, 2.0}) {
+    const EngineCase c("fuel_mg=0 wall_heat_scale=0 gamma=1.35");
+    const Trace t = trace(c, 0.0, error);
+    const Symmetry s = compare_strokes(t.angle, t.pressure, Geometry<double>(c.cylinder.geometry));
+    EXPECT_NEAR(s.tdc_offset_cad, error, 0.03 + 0.01 * std::abs(error));
+    EXPECT_NEAR(s.burn_step, 0.0, 0.005);
+  }
+}
+
+// Heat dQ at volume V raises ln(p V^gamma) by (gamma - 1) dQ/(p V): the step of a short burn without wall heat.
+TEST(EngineStrokes, TheStepIsTheEntropyOfTheBurn) {
+  EngineCase c("wall_heat_scale=0 burn_duration_cad=4 fuel_mg=2 step_cad=0.1");
+  c.soc_cad = -2.0;
+  const Trace t = trace(c);
+  const auto motored = run(EngineCase("wall_heat_scale=0 fuel_mg=0 step_cad=0.1"));
+  const double pv_j = motored.pressure_bar(0.0) * 1e5 * Geometry<double>(c.cylinder.geometry).clearance_m3;
+  const double heat_j = 2.0 * 42.8;
+  const Symmetry s = compare_strokes(t.angle, t.pressure, Geometry<double>(c.cylinder.geometry));
+  EXPECT_NEAR(s.burn_step, std::log(1.0 + 0.37 * heat_j / pv_j), 0.003);  // at constant volume
+}
+
+TEST(EngineStrokes, ATraceTooShortOnOneSideIsNotJudged) {
+  const EngineCase c("fuel_mg=0 evo_cad=78");
+  const Trace t = trace(c);
+  EXPECT_TRUE(std::isnan(compare_strokes(t.angle, t.pressure, Geometry<double>(c.cylinder.geometry)).burn_step));
+  EXPECT_FALSE(analyze_trace(t.angle, t.pressure, c.cylinder, c.point, {}).motored);
+}
+
+// Light load with top dead centre wrong by 3 CAD is still fired; a motored trace is still motored.
+TEST(EngineStrokes, TopDeadCentreDoesNotMakeAFiredTraceMotored) {
+  for (const double error : {-3.0, 0.0, 3.0}) {
+    for (const char* settings :
+         {"fuel_mg=2.2 step_cad=0.5", "fuel_mg=2.3 step_cad=0.5 intake_pressure_kpa=280 soc_cad=-8"}) {
+      const EngineCase c(settings);
+      const double imep = run(c).indicators.imep_closed_bar;
+      ASSERT_GT(imep, 0.4) << settings;
+      ASSERT_LT(imep, 1.1) << settings;
+      const Trace t = trace(c, 0.05, error);
+      EXPECT_FALSE(analyze_trace(t.angle, t.pressure, c.cylinder, c.point, {}).motored) << settings << error;
+    }
+    const EngineCase c("fuel_mg=0 step_cad=0.5 wall_heat_scale=0.4");
+    const Trace t = trace(c, 0.05, error);
+    const auto a = analyze_trace(t.angle, t.pressure, c.cylinder, c.point, {});
+    EXPECT_TRUE(a.motored) << error;
+    EXPECT_NEAR(a.tdc_offset_cad, error, 0.7);
+    EXPECT_TRUE(std::isnan(a.ca50_cad));
+  }
 }
 
 }  // namespace

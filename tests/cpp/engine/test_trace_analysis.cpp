@@ -1,14 +1,16 @@
-// Analysis of traces: edges that tests/python/engine/test_engine_trace.py does not reach.
-#include "mgdd/engine/pressure/pegging.hpp"
-#include "mgdd/engine/pressure/trace_analysis.hpp"
-
+// Analysis of a trace, and its options.
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/charge.hpp"
+#include "mgdd/engine/pressure/pegging.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
+#include "mgdd/engine/pressure/trace_options.hpp"
 #include "support/engine_case.hpp"
 
 namespace mgdd::engine {

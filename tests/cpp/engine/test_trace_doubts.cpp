@@ -37,12 +37,6 @@ TraceAnalysis analyze(const EngineCase& c, double offset_bar = 0.0, double angle
   return analyze_trace(angle, pressure, c.cylinder, with_mass(c), options);
 }
 
-std::string kinds(const TraceAnalysis& a) {
-  std::string all;
-  for (const TraceWarning& w : a.warnings)
-    all += std::string(w.kind) + " ";
-  return all;
-}
 std::string text_of(const TraceAnalysis& a, std::string_view kind) {
   for (const TraceWarning& w : a.warnings) {
     if (w.kind == kind) return w.text;
@@ -88,36 +82,6 @@ TEST(EngineDoubts, TheExponentOfCompressionHasTwoLimits) {
     EXPECT_EQ(!text_of(a, "compression").empty(), doubted) << exponent;
     EXPECT_NEAR(a.n_compression, exponent, 1e-12);
   }
-}
-
-TEST(EngineDoubts, LevelNamesTheUnitThatWouldFit) {
-  TraceOptions o;
-  o.intake_pressure_kpa = 150.0;
-  const EngineCase c("step_cad=0.5");
-  EXPECT_EQ(kinds(analyze(c, 0.0, 0.0, 1.0, o)), "");
-  const auto told = [&](double factor) {
-    const auto cycle = run(c);
-    std::vector<double> p = cycle.pressures_bar();
-    for (double& x : p)
-      x *= factor;
-    return text_of(analyze_trace(cycle.angles(), p, c.cylinder, c.point, o), "level");
-  };
-  EXPECT_NE(told(0.1).find("looks like MPa"), std::string::npos);
-  EXPECT_NE(told(4.0).find("no common unit"), std::string::npos);
-  EXPECT_EQ(told(1.4), "");
-  o.intake_pressure_kpa = 30.0;
-  o.intake_factor = 1.5;
-  EXPECT_NE(told(4.3).find("but the stated intake pressure is 0.3 bar: the trace looks like psi"), std::string::npos);
-  o.intake_pressure_kpa.reset();
-  EXPECT_NE(told(0.1).find("outside 0.2..8 bar"), std::string::npos);
-  const EngineCase low("step_cad=0.5 fuel_mg=1 intake_pressure_kpa=100 compression_ratio=9");
-  o.intake_pressure_kpa = 100.0;
-  const auto cycle = run(low);
-  std::vector<double> psi = cycle.pressures_bar();
-  for (double& x : psi)
-    x *= 14.504;
-  EXPECT_NE(text_of(analyze_trace(cycle.angles(), psi, low.cylinder, low.point, o), "level").find("psi"),
-            std::string::npos);
 }
 
 // Gross IMEP of the simulation lies between the closed one and the bound on what is open.

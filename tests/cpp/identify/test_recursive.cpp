@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <type_traits>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/dynamics/observer.hpp"
@@ -39,6 +40,21 @@ test_support::ThrottleLog supply_step(double duration_s, double step_s) {
   }
   log.angle_deg = test_support::sensed(log.true_deg, 5);
   return log;
+}
+
+/// The estimator after a record; that of the gradient sees the duty that was held until a sample.
+template <class Online>
+Online after(const test_support::ThrottleLog& log) {
+  constexpr bool gradient = std::is_same_v<Online, GradientPwR>;
+  Online online({});
+  if constexpr (gradient) online.start(log.angle_deg[0]);
+  for (std::size_t k = 1; k < log.duty.size(); ++k) {
+    static_cast<void>(online.update(log.duty[gradient ? k - 1 : k], log.angle_deg[k]));
+    if constexpr (std::is_same_v<Online, WindowPwR>) {
+      if (k % 50 == 49) static_cast<void>(online.iterate());
+    }
+  }
+  return online;
 }
 
 TEST(RecursivePwR, TracksAStepOfTheSupply) {
@@ -102,12 +118,7 @@ TEST(RecursivePwR, EstimatesStayInsideTheirBounds) {
 }
 
 TEST(WindowPwR, TracksAStepOfTheSupply) {
-  const auto log = supply_step(12.0, 4.0);
-  WindowPwR online(WindowPwRSettings{});
-  for (std::size_t k = 0; k < log.duty.size(); ++k) {
-    static_cast<void>(online.update(log.duty[k], log.angle_deg[k]));
-    if (k % 50 == 49) static_cast<void>(online.iterate());
-  }
+  WindowPwR online = after<WindowPwR>(supply_step(12.0, 4.0));
   const auto after = online.model().above;
   EXPECT_NEAR(after.gain_deg_per_s2_per_duty, 1.2 * 83597.0, 0.1 * 1.2 * 83597.0);
   EXPECT_NEAR(after.preload_duty, 0.1292 / 1.2, 0.012);
@@ -130,11 +141,7 @@ TEST(WindowPwR, ThePriorKeepsWhatTheWindowDoesNotExcite) {
 }
 
 TEST(GradientPwR, MovesTheGainTowardTheTruthAndKeepsItAtRest) {
-  const auto log = supply_step(30.0, 0.0);
-  GradientPwR online(GradientPwRSettings{});
-  online.start(log.angle_deg[0]);
-  for (std::size_t k = 1; k < log.duty.size(); ++k)
-    static_cast<void>(online.update(log.duty[k - 1], log.angle_deg[k]));
+  GradientPwR online = after<GradientPwR>(supply_step(30.0, 0.0));
   const auto after = online.model().above;
   EXPECT_NEAR(after.gain_deg_per_s2_per_duty, 1.2 * 83597.0, 0.12 * 1.2 * 83597.0);
   GradientPwR other(GradientPwRSettings{});
@@ -175,67 +182,34 @@ test_support::ThrottleLog with_gaps(test_support::ThrottleLog log) {
   return log;
 }
 
-TEST(RecursivePwR, DroppedSamplesCostNothingButThemselves) {
+template <class Online>
+Online after_gaps(double most) {
   const auto log = supply_step(8.2, 3.0);
-  const auto holed = with_gaps(log);
-  RecursivePwR clean(RecursivePwRSettings{});
-  RecursivePwR online(RecursivePwRSettings{});
-  int dropped = 0;
-  for (std::size_t k = 0; k < log.duty.size(); ++k) {
-    static_cast<void>(clean.update(log.duty[k], log.angle_deg[k]));
-    dropped += online.update(holed.duty[k], holed.angle_deg[k]) == UpdateGate::not_finite;
-  }
-  EXPECT_EQ(dropped, 80);
-  const auto a = clean.model().above;
-  const auto b = online.model().above;
-  EXPECT_NEAR(b.gain_deg_per_s2_per_duty / a.gain_deg_per_s2_per_duty, 1.0, 5e-3);
-  EXPECT_NEAR(b.preload_duty / a.preload_duty, 1.0, 5e-3);
-  EXPECT_LT(online.updates(), clean.updates());
-  EXPECT_GT(online.updates(), clean.updates() * 8 / 10);
+  const auto clean = after<Online>(log).model().above;
+  const Online online = after<Online>(with_gaps(log));
+  const auto above = online.model().above;
+  EXPECT_NEAR(above.gain_deg_per_s2_per_duty / clean.gain_deg_per_s2_per_duty, 1.0, most);
+  EXPECT_NEAR(above.preload_duty / clean.preload_duty, 1.0, most);
+  return online;
 }
 
-TEST(WindowPwR, DroppedSamplesCostNothingButThemselves) {
-  const auto log = supply_step(8.2, 3.0);
-  const auto holed = with_gaps(log);
-  WindowPwR clean(WindowPwRSettings{});
-  WindowPwR online(WindowPwRSettings{});
-  for (std::size_t k = 0; k < log.duty.size(); ++k) {
-    static_cast<void>(clean.update(log.duty[k], log.angle_deg[k]));
-    static_cast<void>(online.update(holed.duty[k], holed.angle_deg[k]));
-    if (k % 50 != 49) continue;
-    static_cast<void>(clean.iterate());
-    static_cast<void>(online.iterate());
-  }
-  const auto a = clean.model().above;
-  const auto b = online.model().above;
-  EXPECT_NEAR(b.gain_deg_per_s2_per_duty / a.gain_deg_per_s2_per_duty, 1.0, 0.01);
-  EXPECT_NEAR(b.preload_duty / a.preload_duty, 1.0, 0.01);
+TEST(RecursiveEstimators, DroppedSamplesCostNothingButThemselves) {
+  const auto updates = after<RecursivePwR>(supply_step(8.2, 3.0)).updates();
+  const auto fewer = after_gaps<RecursivePwR>(5e-3).updates();
+  EXPECT_LT(fewer, updates);
+  EXPECT_GT(fewer, updates * 8 / 10);
+  WindowPwR window = after_gaps<WindowPwR>(0.01);
+  const auto before = window.model().above;
   for (int k = 0; k < 600; ++k)
-    EXPECT_FALSE(online.update(0.1, std::nan("")));
-  EXPECT_FALSE(online.iterate());
-  EXPECT_EQ(online.model().above, b);
-}
-
-TEST(GradientPwR, DroppedSamplesCostNothingButThemselves) {
-  const auto log = supply_step(8.2, 3.0);
-  const auto holed = with_gaps(log);
-  GradientPwR clean(GradientPwRSettings{});
-  GradientPwR online(GradientPwRSettings{});
-  clean.start(log.angle_deg[0]);
-  online.start(log.angle_deg[0]);
-  for (std::size_t k = 1; k < log.duty.size(); ++k) {
-    static_cast<void>(clean.update(log.duty[k - 1], log.angle_deg[k]));
-    static_cast<void>(online.update(holed.duty[k - 1], holed.angle_deg[k]));
-  }
-  const auto a = clean.model().above;
-  const auto b = online.model().above;
-  EXPECT_NEAR(b.gain_deg_per_s2_per_duty / a.gain_deg_per_s2_per_duty, 1.0, 0.01);
-  EXPECT_NEAR(b.preload_duty / a.preload_duty, 1.0, 0.01);
+    EXPECT_FALSE(window.update(0.1, std::nan("")));
+  EXPECT_FALSE(window.iterate());
+  EXPECT_EQ(window.model().above, before);
   // A gap of half a second: the observer runs on instead of standing where the plate was.
+  GradientPwR gradient = after_gaps<GradientPwR>(0.01);
   for (int k = 0; k < 500; ++k)
-    EXPECT_EQ(online.update(1.0, std::nan("")), 0.0);
-  EXPECT_GT(online.update(1.0, 90.0), -5.0);
-  EXPECT_LT(online.update(1.0, 90.0), 5.0);
+    EXPECT_EQ(gradient.update(1.0, std::nan("")), 0.0);
+  EXPECT_GT(gradient.update(1.0, 90.0), -5.0);
+  EXPECT_LT(gradient.update(1.0, 90.0), 5.0);
 }
 
 TEST(RecursiveRealTime, NothingIsAllocated) {

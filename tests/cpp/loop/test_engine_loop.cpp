@@ -1,11 +1,16 @@
-// The closed loop: what it promises to a controller, and what it makes of a run.
-#include "mgdd/loop/engine_loop.hpp"
+// Loops around a bench: figures by their definitions, no allocation, functions as plants, many at once.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <vector>
-
+#include "mgdd/loop/cycle_fields.hpp"
+#include "mgdd/loop/engine_loop.hpp"
+#include "mgdd/loop/function_plant.hpp"
+#include "mgdd/loop/monte_carlo.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::loop {
@@ -96,6 +101,119 @@ TEST(LoopStatistics, SaysNothingOfWhatWasNotAskedOrDidNotHappen) {
   EXPECT_TRUE(std::isnan(away.summary().cycles_to));
   EXPECT_TRUE(std::isnan(away.summary().cycles_stays));
   EXPECT_DOUBLE_EQ(away.summary().rms_cad, 5.0);
+}
+
+int hill(const double* inputs, std::size_t, double* outputs, std::size_t, void*) {
+  outputs[0] = 50.0 - 0.03 * (inputs[0] + 4.0) * (inputs[0] + 4.0);
+  return inputs[0] > 5.0 ? 3 : 0;
+}
+
+TEST(FunctionPlant, AStepAllocatesNothing) {
+  FunctionPlant plant(&hill, nullptr, {.noise_sd = 0.5});
+  optimize::SpsaSettings s;
+  s.space = {optimize::scalar_input(-12.0), optimize::scalar_input(-30.0), optimize::scalar_input(10.0)};
+  optimize::Spsa seeker(s);
+  static_assert(noexcept(loop_step(plant, seeker)));
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 100; ++k)
+    loop_step(plant, seeker);
+  EXPECT_EQ(counter.count(), 0u);
+}
+
+MonteCarloPlan small_plan() {
+  MonteCarloPlan plan;
+  BenchSettings bench;
+  bench.limits = {"p_max_bar"};
+  plan.benches.emplace_back(bench);
+  bench.schedule[0].point.fuel_mg = 30.0;
+  bench.misfire_probability = 0.01;
+  plan.benches.emplace_back(bench);
+  plan.criteria = {{.optimum_cad = -5.6, .exceed_from = 100, .exceed_above = {95.0}}, {.optimum_cad = -9.0}};
+  const optimize::SearchSpace space{scalar_input(-12.0), scalar_input(-30.0), scalar_input(10.0)};
+  const std::vector<optimize::Limit> limits{{.name = "p_max_bar", .upper = 150.0}};
+  optimize::ExtremumSeekingSettings esc;
+  esc.space = space;
+  esc.limits = limits;
+  optimize::SpsaSettings spsa;
+  spsa.space = space;
+  spsa.limits = limits;
+  plan.seekers = {optimize::ExtremumSeeking(esc), optimize::Spsa(spsa)};
+  plan.seeds = {3, 1, 4};
+  plan.cycles = 300;
+  return plan;
+}
+
+bool same(const LoopSummary& a, const LoopSummary& b) {  // bit for bit, NaN included
+  // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): eight bytes each, no padding
+  return std::memcmp(&a, &b, sizeof(LoopSummary)) == 0;
+}
+
+MonteCarloPlan wide_plan() {  // three operating points, the last with a gamma of temperature
+  MonteCarloPlan plan = small_plan();
+  BenchSettings bench = plan.benches[1].settings();
+  bench.cylinder.gas.gamma_model = engine::GammaModel::linear;
+  plan.benches.emplace_back(bench);
+  plan.criteria.push_back({.optimum_cad = -7.0});
+  plan.seeds = {3, 1, 4, 8, 5};
+  return plan;
+}
+
+TEST(MonteCarlo, LanesAreTheSameOnAnyNumberOfThreadsAndInAnyPieces) {
+  MonteCarloPlan plan = wide_plan();
+  EXPECT_EQ(form_of_loops(30, plan.form), LoopForm::lanes);
+  plan.threads = 1;
+  const MonteCarloResult one = monte_carlo(plan, {});
+  plan.threads = 3;
+  const MonteCarloResult three = monte_carlo(plan, {});
+  ASSERT_EQ(one.loops.size(), 30u);
+  for (std::size_t i = 0; i < 30; ++i) {
+    EXPECT_TRUE(one.finished[i]);
+    EXPECT_TRUE(same(one.loops[i], three.loops[i])) << i;
+  }
+  MonteCarloPlan piece = plan;  // bench 1, seeker 1, seeds 8 and 5
+  piece.benches = {plan.benches[1]};
+  piece.criteria = {plan.criteria[1]};
+  piece.seekers = {plan.seekers[1]};
+  piece.seeds = {8, 5};
+  piece.form = LoopForm::lanes;
+  const MonteCarloResult part = monte_carlo(piece, {});
+  EXPECT_TRUE(same(part.loops[0], one.loops[18]));
+  EXPECT_TRUE(same(part.loops[1], one.loops[19]));
+}
+
+TEST(MonteCarlo, LanesGiveTheNumbersOfSingleLoops) {
+  MonteCarloPlan plan = wide_plan();
+  const MonteCarloResult lanes = monte_carlo(plan, {});
+  plan.form = LoopForm::single;
+  const MonteCarloResult single = monte_carlo(plan, {});
+  int differing = 0;
+  for (std::size_t i = 0; i < 30; ++i) {
+    for (const auto& number : loop_summary_numbers) {
+      const double a = number.of(lanes.loops[i]), b = number.of(single.loops[i]);
+      EXPECT_EQ(std::isnan(a), std::isnan(b)) << number.name << ' ' << i;
+      const double distance = std::isnan(b) || a == b ? 0.0 : std::abs(a - b);
+      EXPECT_LE(distance, 1e-7 * std::max(1.0, std::abs(b))) << number.name << ' ' << i;
+    }
+    EXPECT_NEAR(lanes.loops[i].limits[0].worst, single.loops[i].limits[0].worst, 1e-6) << i;
+    differing += same(lanes.loops[i], single.loops[i]) ? 0 : 1;
+    if (i >= 20) {  // a gamma of temperature has no lanes
+      EXPECT_TRUE(same(lanes.loops[i], single.loops[i])) << i;
+    }
+  }
+  EXPECT_GT(differing, 0);  // other roundings: lanes did run
+}
+
+TEST(MonteCarlo, AFewLoopsHaveTheBitsOfSingleOnes) {
+  EXPECT_EQ(form_of_loops(15, LoopForm::automatic), LoopForm::single);
+  EXPECT_EQ(form_of_loops(15, LoopForm::lanes), LoopForm::lanes);
+  EXPECT_EQ(form_of_loops(16, LoopForm::automatic), LoopForm::lanes);
+  EXPECT_THROW(static_cast<void>(form_of_loops(16, LoopForm::shared)), ParameterError);
+}
+
+TEST(MonteCarlo, AnExceptionOfTheStopCallbackEndsTheLoops) {
+  MonteCarloPlan plan = small_plan();
+  plan.cycles = 1'000'000'000;  // would take hours
+  EXPECT_THROW(monte_carlo(plan, []() -> bool { throw std::runtime_error("signal"); }), std::runtime_error);
 }
 
 }  // namespace

@@ -1,12 +1,14 @@
-#include "mgdd/math/zero_phase.hpp"
-
+// Filters without a shift of phase: low passes of second order, and bands.
+#include <Eigen/Core>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include <gtest/gtest.h>
-#include <Eigen/Core>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/math/band_pass.hpp"
+#include "mgdd/math/zero_phase.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd {
@@ -70,6 +72,69 @@ TEST(ZeroPhaseLowPass, AllocatesNothingAndRefusesBadCutoffs) {
     EXPECT_THROW(ZeroPhaseLowPass(10, cutoff), ParameterError) << cutoff;
   }
   EXPECT_THROW(ZeroPhaseLowPass(0, 0.2), ParameterError);
+}
+
+double tone(double frequency, double sample) {
+  return std::sin(std::numbers::pi * frequency * sample + 0.3);
+}
+
+// Largest difference of the filtered tone from `factor` times the tone at the same place.
+double largest_error(const BandPass& band, double frequency, double factor) {
+  std::vector<double> column(300 + 2 * band.reach()), out(300);
+  for (std::size_t k = 0; k < column.size(); ++k)
+    column[k] = tone(frequency, static_cast<double>(k));
+  band.apply(column, out);
+  double most = 0.0;
+  for (std::size_t k = 0; k < out.size(); ++k)
+    most = std::max(most, std::abs(out[k] - factor * column[k + band.reach()]));
+  return most;
+}
+
+TEST(MathBandPass, KeepsItsBandAndNothingElse) {
+  const BandPass band(0.2, 0.7, 0.08);
+  for (const double inside : {0.24, 0.3, 0.45, 0.66})
+    EXPECT_LT(largest_error(band, inside, 1.0), 1.1e-4) << inside;
+  for (const double outside : {0.01, 0.1, 0.16, 0.74, 0.95})
+    EXPECT_LT(largest_error(band, outside, 0.0), 1.1e-4) << outside;
+  for (const double edge : {0.2, 0.7})
+    EXPECT_LT(largest_error(band, edge, 0.5), 2e-4) << edge;
+}
+
+TEST(MathBandPass, GainIsWhatATonePassesWith) {
+  const BandPass band(0.13, 0.51, 0.1);
+  for (double f = 0.02; f < 1.0; f += 0.035)
+    EXPECT_LT(largest_error(band, f, band.gain(f)), 1e-12) << f;
+}
+
+TEST(MathBandPass, AnUpperEdgeBeyondNyquistMakesAHighPass) {
+  for (const double high : {0.97, 1.0, 7.0}) {
+    const BandPass band(0.3, high, 0.1);
+    EXPECT_NEAR(band.gain(0.99), 1.0, 1.1e-4);
+    EXPECT_NEAR(band.gain(0.36), 1.0, 1.1e-4);
+    EXPECT_LT(std::abs(band.gain(0.24)), 1.1e-4);
+  }
+}
+
+TEST(MathBandPass, ASharperTransitionReachesFarther) {
+  EXPECT_GT(BandPass(0.2, 0.7, 0.04).reach(), 1.9 * static_cast<double>(BandPass(0.2, 0.7, 0.08).reach()));
+}
+
+TEST(MathBandPass, RefusesABandThatCannotBe) {
+  EXPECT_THROW(BandPass(0.0, 0.5, 0.1), ParameterError);
+  EXPECT_THROW(BandPass(1.0, 2.0, 0.1), ParameterError);
+  EXPECT_THROW(BandPass(0.4, 0.4, 0.1), ParameterError);
+  EXPECT_THROW(BandPass(0.2, 0.5, 0.4), ParameterError);
+  EXPECT_THROW(BandPass(0.2, 0.5, std::nan("")), ParameterError);
+}
+
+TEST(MathBandPass, AllocatesNothing) {
+  const BandPass band(0.2, 0.7, 0.08);
+  static_assert(noexcept(band.apply({}, {})));
+  std::vector<double> column(100 + 2 * band.reach(), 1.0), out(100);
+  band.apply(column, out);
+  const test_support::AllocationCounter counter;
+  band.apply(column, out);
+  EXPECT_EQ(counter.count(), 0u);
 }
 
 }  // namespace

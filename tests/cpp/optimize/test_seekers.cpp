@@ -1,5 +1,8 @@
 // What holds for every seeker and form and is not seen from Python, whose contract test has the rest: the search on a
-// noisy quadratic from far away, and that ask and tell allocate nothing.
+// noisy quadratic from far away, a shift of the estimate, and that ask, tell and history allocate nothing.
+#include <gtest/gtest.h>
+
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
@@ -134,6 +137,95 @@ TEST(Steps, OfTwoBesideALimitTheOneThatKeepsItIsSet) {
   const auto sum = [](const Inputs& at) { return at.sum() - 0.2; };  // over by .123 at the nearest
   EXPECT_TRUE(steps.nearest(wanted, sum).isApprox(below, 1e-12)) << steps.nearest(wanted, sum).transpose();
   EXPECT_FALSE(steps_of({Input{"c"}}).any());
+}
+
+double bowl(const Inputs& x, const Inputs& centre) {
+  const Inputs away = x - centre;
+  return 0.5 * bend * away.squaredNorm() + 0.004 * away[0] * away[0] * away[0] / (1.0 + away.squaredNorm());
+}
+
+template <class S>
+void seek(S& seeker, const Inputs& centre, int from, int cycles) {
+  for (int k = from; k < from + cycles; ++k) {
+    const double noise = 0.25 * random::normal(9, 3, static_cast<std::uint64_t>(k));
+    cycle_of(seeker, [&](const Inputs& x) { return bowl(x, centre) + noise; });
+  }
+}
+
+TEST(ShiftEstimate, MovesTheEstimateAndNothingElseOfTheSearch) {
+  for (const SearchSpace& space : {space_at(scalar_input(8.0)), space_at(inputs({8.0, -6.0, 4.0}))}) {
+    const Inputs still = Inputs::Zero(space.size());
+    const Inputs by = space.size() == 1 ? scalar_input(-3.25) : inputs({-3.25, 2.5, 0.75});
+    for (auto& [name, any] : every_seeker(space, 0.25, 3)) {
+      SCOPED_TRACE(name + ", inputs " + std::to_string(space.size()));
+      std::visit(
+          [&](auto& moved) {
+            auto plain = moved;
+            seek(plain, still, 0, 123);
+            seek(moved, still, 0, 123);
+            moved.restart();
+            plain.restart();
+            moved.shift_estimate(by);
+            EXPECT_LT((moved.estimate() - plain.estimate() - by).norm(), 1e-12);
+            if (name == "golden_section") return;  // its bracket does not move: the whole range is searched again
+            seek(plain, still, 123, 150);
+            seek(moved, by, 123, 150);
+            EXPECT_LT((moved.estimate() - plain.estimate() - by).norm(), 1e-9);
+          },
+          any);
+    }
+  }
+}
+
+TEST(ShiftEstimate, MovesABracketThatHasConverged) {
+  GoldenSectionSettings s;
+  s.space = {scalar_input(0.0), scalar_input(-40.0), scalar_input(40.0)};
+  s.noise_sd = 0.25;
+  GoldenSection plain(s);
+  seek(plain, scalar_input(3.0), 0, 400);
+  ASSERT_TRUE(plain.converged());
+  GoldenSection moved = plain;
+  moved.shift_estimate(scalar_input(-7.5));
+  seek(plain, scalar_input(3.0), 400, 90);
+  seek(moved, scalar_input(3.0 - 7.5), 400, 90);
+  EXPECT_NEAR(moved.estimate()[0], plain.estimate()[0] - 7.5, 1e-9);
+}
+
+TEST(ShiftEstimate, KeepsTheRoomOfThePerturbationWithinTheBounds) {
+  for (const double by : {-60.0, 55.0}) {
+    for (auto& [name, any] : every_seeker(space_at(scalar_input(8.0), 20.0), 0.25, 3)) {
+      SCOPED_TRACE(name);
+      std::visit(
+          [&](auto& seeker) {
+            seeker.shift_estimate(scalar_input(by));
+            EXPECT_NEAR(seeker.estimate()[0], std::copysign(18.0, by), 2.0);
+            for (int k = 0; k < 40; ++k) {
+              EXPECT_LE(std::abs(seeker.ask()[0]), 20.0);
+              cycle_of(seeker, [](const Inputs& x) { return quadratic(x[0]); });
+            }
+          },
+          any);
+    }
+  }
+}
+
+RecordedSeeker<Spsa> two_inputs() {
+  SpsaSettings settings;
+  settings.space = space_at(inputs({8.0, -6.0}), 20.0);
+  settings.seed = 4;
+  return RecordedSeeker<Spsa>(Spsa(settings));
+}
+
+TEST(SeekerHistory, RoomThatWasMadeIsNotAllocatedAgain) {
+  RecordedSeeker<Spsa> seeker = two_inputs();
+  seeker.history().make_room(200);
+  const double j[] = {1.0};
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 200; ++k) {
+    seeker.ask();
+    seeker.tell({j, {}, false});
+  }
+  EXPECT_EQ(counter.count(), 0u);
 }
 
 }  // namespace

@@ -91,29 +91,6 @@ class RecordFile : public testing::Test {
   std::string path_;
 };
 
-TEST_F(RecordFile, CutAnywhereTheRestIsIgnoredAndCounted) {
-  write_all();
-  const Bytes whole = bytes_of(path_);
-  std::uint64_t before = 0;
-  for (std::size_t size = 0; size <= whole.size(); ++size) {
-    put(path_, Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)));
-    if (size < header_head + header.json.size() + 4) {
-      EXPECT_THROW(RecordReader{path_}, DataError);
-      continue;
-    }
-    RecordReader reader(path_);
-    std::uint64_t records = 0;
-    while (reader.next())
-      ++records;
-    EXPECT_EQ(reader.position() + reader.ignored_bytes(), size);
-    EXPECT_LE(reader.ignored_bytes(), largest_frame_record);
-    EXPECT_EQ(reader.incomplete(), reader.ignored_bytes() > 0);
-    EXPECT_GE(records, before);
-    before = records;
-  }
-  EXPECT_EQ(before, 49u);
-}
-
 TEST_F(RecordFile, AnyFlippedBitStopsTheReaderThereAndARepairLosesNothing) {
   write_all();
   const Bytes whole = bytes_of(path_);

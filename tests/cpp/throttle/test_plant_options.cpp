@@ -1,13 +1,15 @@
-// Every combination of options: nothing throws, lanes hold the bits of plain code.
-#include <gtest/gtest.h>
-
+// Every combination of options: nothing throws, lanes hold the bits of plain code, columns act from their own sample
+// on, and a side without friction is the limit of one with little; test_plant_equations.cpp has the rest.
 #include <cmath>
 #include <cstddef>
 #include <type_traits>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "mgdd/common/error.hpp"
 #include "mgdd/math/dual.hpp"
+#include "mgdd/throttle/plant.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
 #include "support/throttle_case.hpp"
@@ -139,23 +141,12 @@ TEST(ThrottleOptions, LanesStartFromTheWholeState) {
     for (std::size_t k = 0; k < duty.size(); ++k)
       ASSERT_NEAR(many[i * duty.size() + k], angle[k], 1e-11) << i << ' ' << k;
   }
-  EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
-  EXPECT_THROW(simulate_many(cases, {.duty = duty}, 3, 6e-3), ParameterError);
-  const std::vector<double> percent(duty.size(), 35.0), short_supply(2, 12.0);
-  EXPECT_THROW(simulate_many(cases, {.duty = percent}, 3, 2e-4), DataError);
-  EXPECT_THROW(simulate_many(cases, {.duty = duty, .supply_v = short_supply}, 3, 2e-4), ShapeError);
-  for (const bool friction : {true, false}) {
+  for (auto change : {+[](Throttle& t) { t.friction = Friction::tanh; }, +[](Throttle& t) { t.backlash = {}; }}) {
     auto mixed = cases;
-    if (friction) {
-      mixed[5].throttle.friction = Friction::tanh;
-    } else {
-      mixed[5].throttle.backlash = Backlash::none;
-    }
+    change(mixed[5].throttle);
     EXPECT_THROW(simulate_many(mixed, {.duty = duty}, 3, 2e-4), ParameterError);
   }
-  auto bad = cases;
-  bad[8].throttle.inertia_kgm2 = -1.0;
-  EXPECT_THROW(simulate_many(bad, {.duty = duty}, 3, 2e-4), ParameterError);
+  EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
 }
 
 // A supply that falls below what the bridge drops drives nothing, and nothing backwards.
@@ -170,6 +161,101 @@ TEST(ThrottleOptions, ASupplyBelowTheDropDrivesNothing) {
   low.input.supply_v = 12.0;
   low.go(1.0, 0.2);
   EXPECT_GT(low.angle_deg(), 80.0);
+}
+
+using test::DrivenThrottle;
+
+// A side of the gap without friction is the limit of a side with next to none.
+TEST(ThrottleLaws, ASideWithoutFrictionIsTheLimitOfATinyShare) {
+  for (const Friction form : {Friction::coulomb, Friction::stiction, Friction::stribeck, Friction::karnopp,
+                              Friction::tanh, Friction::lugre}) {
+    for (const bool plate_is_free : {true, false}) {
+      const auto with_share = [&](double share) {
+        Throttle p;
+        p.stiction_nm = 0.31;
+        p.backlash = Backlash::compliance;
+        p.friction = form;
+        p.plate_friction_share = plate_is_free ? share : 1.0 - share;
+        return DrivenThrottle(p, 30.0);
+      };
+      DrivenThrottle none = with_share(0.0);
+      DrivenThrottle tiny = with_share(1e-9);
+      double worst = 0.0;
+      for (int k = 0; k < 5000; ++k) {
+        const double duty = 0.2 + 0.4 * std::sin(2.5e-3 * k);
+        none.step(duty);
+        tiny.step(duty);
+        ASSERT_TRUE(std::isfinite(none.angle_deg())) << static_cast<int>(form) << ' ' << k;
+        worst = std::fmax(worst, std::abs(none.angle_deg() - tiny.angle_deg()));
+      }
+      EXPECT_LT(worst, 1e-4) << static_cast<int>(form) << ' ' << plate_is_free;
+      EXPECT_GT(std::abs(none.angle_deg() - 30.0), 5.0);
+    }
+  }
+}
+
+// Bristles on both sides of a closed gap share the load as the friction is shared: the deflection is that of one mass.
+TEST(ThrottleLaws, PreslidingIsTheSameHoweverTheFrictionIsShared) {
+  Throttle whole;
+  whole.friction = Friction::lugre;
+  whole.inductance_mh = 0.0;
+  const auto bend_deg = [](const Throttle& p) {
+    DrivenThrottle t(p, 40.0);
+    const double balance = t.spring_nm(40.0) / p.stall_torque_nm();
+    t.go(balance + 0.2 * p.coulomb_nm / p.stall_torque_nm(), 0.3);
+    return t.angle_deg() - 40.0;
+  };
+  const double expected = bend_deg(whole);
+  EXPECT_GT(expected, 0.03);
+  Throttle geared = whole;
+  geared.backlash = Backlash::compliance;
+  geared.backlash_half_deg = 1e-6;
+  geared.gear_stiffness_nm_per_rad = 20000.0;
+  for (const double share : {0.0, 0.3, 0.8, 1.0}) {
+    geared.plate_friction_share = share;
+    EXPECT_NEAR(bend_deg(geared), expected, 0.03 * expected) << share;
+  }
+}
+
+using test::asymmetric_throttle;
+
+constexpr double start_deg = 40.0;
+
+// The inputs of sample k act from k to k + 1, in one run and in many.
+TEST(PlantSigns, AColumnActsFromItsOwnSampleOn) {
+  const Throttle p = asymmetric_throttle();
+  const std::size_t n = 12;
+  const std::vector<double> duty(n, 0.3), volts(n, 11.0), torque(n, 0.05);
+  const auto runs = [&](const ThrottleSignals& signals) {
+    std::vector<double> one(n);
+    ThrottleState state = at_rest(start_deg);
+    simulate(ThrottlePlant(p), signals, 10, state, {.angle_deg = one});
+    const std::vector<ThrottleCase> cases{{p, at_rest(start_deg)}};
+    EXPECT_EQ(simulate_many(cases, signals, 10, default_step_s), one);
+    return one;
+  };
+  const std::vector<double> plain = runs({duty, volts, torque});
+  const auto expect_change = [&](const ThrottleSignals& signals, double sign, const char* what) {
+    const std::vector<double> changed = runs(signals);
+    for (std::size_t k = 0; k < n; ++k) {
+      if (k <= 5) {
+        EXPECT_EQ(changed[k], plain[k]) << what << ' ' << k;
+      } else {
+        EXPECT_GT(sign * (changed[k] - plain[k]), 1e-6) << what << ' ' << k;
+      }
+    }
+  };
+  auto other = duty;
+  other[5] = 0.6;
+  expect_change({other, volts, torque}, 1.0, "duty");
+  other = volts;
+  other[5] = 14.0;
+  expect_change({duty, other, torque}, 1.0, "supply_v");
+  other = torque;
+  other[5] = -0.4;
+  expect_change({duty, volts, other}, -1.0, "airflow_torque_nm");
+  const std::vector<double> own(n, p.supply_v), none(n, 0.0);
+  EXPECT_EQ(runs({duty}), runs({duty, own, none})) << "left out: the parameter's supply and no extra torque";
 }
 
 }  // namespace

@@ -5,15 +5,12 @@
 #include <cmath>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
-#include "mgdd/throttle/models/smooth.hpp"
 #include "mgdd/throttle/sensors.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
-#include "support/preset_file.hpp"
 
 namespace mgdd::throttle {
 namespace {
@@ -29,40 +26,7 @@ std::string message(const Throttle& t) {
   return "";
 }
 
-// A change of the preset is a breaking change.
-TEST(ThrottleNumbers, DefaultsAreThePresetP1) {
-  const Throttle standard;
-  test_support::expect_preset(standard, fields(),
-                              {{"friction", name_of(standard.friction)}, {"backlash", name_of(standard.backlash)}},
-                              "P1", "throttle");
-  EXPECT_EQ(default_step_s, 1e-4);
-}
-
 // --- what is allowed ------------------------------------------------------------------------------------------
-
-TEST(ThrottleNumbers, EveryFieldHasItsBoundsAndTheyBelongWhereTheySay) {
-  for (const auto& field : fields()) {
-    const FieldInfo& info = field.info;
-    const Domain& domain = info.domain;
-    const auto with = [&](double value) {
-      Throttle t = asymmetric_throttle();
-      field.in(t) = value;
-      return message(t);
-    };
-    const auto outside = [&](double value) {
-      return with(value).find(": " + requirement(domain)) != std::string::npos;
-    };
-    EXPECT_EQ(outside(domain.lower), domain.lower_open) << info.name;
-    EXPECT_TRUE(outside(domain.lower - 1e-9 * std::fmax(1.0, std::abs(domain.lower)))) << info.name;
-    EXPECT_FALSE(outside(domain.upper)) << info.name;
-    EXPECT_TRUE(outside(NAN)) << info.name;
-    EXPECT_TRUE(outside(domain.upper * (1.0 + 1e-12))) << info.name;
-    const std::string beyond = with(domain.upper * 2.0);
-    EXPECT_EQ(beyond.rfind(std::string(info.name) + " = ", 0), 0U) << beyond;
-    EXPECT_NE(beyond.find(text(domain.upper)), std::string::npos) << beyond;
-    EXPECT_EQ(beyond.find(" " + std::string(info.unit) + ": must") != std::string::npos, info.unit != "-") << beyond;
-  }
-}
 
 TEST(ThrottleNumbers, RulesBetweenFields) {
   const auto with = [](auto change) {
@@ -94,38 +58,6 @@ TEST(ThrottleNumbers, RulesBetweenFields) {
   EXPECT_EQ(with([](Throttle& t) { t.backlash = Backlash::compliance; }), "");
 }
 
-TEST(ThrottleNumbers, StepsAndColumnsHaveTheirs) {
-  EXPECT_NO_THROW(ThrottlePlant(asymmetric_throttle(), 1e-6));
-  EXPECT_NO_THROW(ThrottlePlant(asymmetric_throttle(), 5e-3));
-  EXPECT_THROW(ThrottlePlant(asymmetric_throttle(), 0.9e-6), ParameterError);
-  EXPECT_THROW(ThrottlePlant(asymmetric_throttle(), 5.1e-3), ParameterError);
-  EXPECT_EQ(steps_per_sample(1e-3, 1e-3), 1U);
-  EXPECT_EQ(steps_per_sample(3e-3, 1e-3), 3U);
-  EXPECT_EQ(steps_per_sample(1e-2 * (1.0 + 5e-10), 1e-4), 100U);
-  EXPECT_THROW(steps_per_sample(1e-2 * (1.0 + 3e-9), 1e-4), ParameterError);
-  EXPECT_THROW(steps_per_sample(4e-4, 1e-3), ParameterError) << "less than one step";
-  EXPECT_THROW(steps_per_sample(1e-2, 6e-3), ParameterError);
-  EXPECT_THROW(steps_per_sample(1e-6, 0.5e-6), ParameterError);
-  const std::vector<double> duty{0.5, -1.0, 1.0}, volts{12.0, 0.0, 9.0}, torque{0.0, -0.5, 0.5};
-  EXPECT_NO_THROW(validate(ThrottleSignals{duty, volts, torque}));
-  EXPECT_NO_THROW(validate(ThrottleSignals{.duty = duty}));
-  const auto refused = [](const ThrottleSignals& signals, const std::string& part) {
-    try {
-      validate(signals);
-      ADD_FAILURE() << part;
-    } catch (const DataError& error) {
-      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-    }
-  };
-  const std::vector<double> beyond{0.0, 0.0, -1.01}, negative{12.0, -0.1, 12.0}, gap{0.0, NAN, 0.0}, two{1.0, 1.0};
-  refused({.duty = beyond}, "duty = -1.01 at sample 2");
-  refused({.duty = gap}, "duty is nan at sample 1");
-  refused({.duty = duty, .supply_v = negative}, "supply_v = -0.1 V at sample 1");
-  refused({.duty = duty, .airflow_torque_nm = gap}, "airflow_torque_nm is nan at sample 1");
-  EXPECT_THROW(validate(ThrottleSignals{.duty = duty, .supply_v = two}), ShapeError);
-  EXPECT_THROW(validate(ThrottleSignals{.duty = duty, .supply_v = {}, .airflow_torque_nm = two}), ShapeError);
-}
-
 // --- air flow and the smooth twin -----------------------------------------------------------------------------
 
 TEST(ThrottleNumbers, TheClosingTorqueOfTheAirIsTheLineThroughItsTable) {
@@ -143,28 +75,6 @@ TEST(ThrottleNumbers, TheClosingTorqueOfTheAirIsTheLineThroughItsTable) {
   EXPECT_EQ(airflow_coefficient(91.0), 0.0);
   EXPECT_EQ(airflow_coefficient(NAN), 0.0);
   EXPECT_NEAR(airflow_torque_nm(asymmetric_throttle(), 60.0), -0.052 * 0.052 * 0.052 * 7000.0 * 0.060, 1e-15);
-}
-
-TEST(SmoothPlant, SolvesItsEquations) {
-  const SmoothPlant plant{.inertia_kgm2 = 3e-3, .gear_ratio = 17.0, .inductance_h = 2e-3, .supply_v = 13.0};
-  const std::array<double, 10> p{0.016, 4e-3, 0.12, 0.5, 0.13, 0.25, 0.02, 0.14, 0.018, 1.2};
-  const auto c = plant.coefficients(p);
-  for (const double away : {-0.05, -0.01, 0.01, 0.2}) {
-    for (const double speed : {-3.0, -0.2, 0.4, 2.0}) {
-      const std::array<double, 3> x{0.14 + away, speed, 0.7};
-      const auto dx = plant.derivative(c, x, std::array<double, 1>{0.3});
-      const double torque = 17.0 * 0.016 * 0.7 - 4e-3 * speed - 0.12 * std::tanh(speed / 0.5) - 0.13 * away -
-                            0.25 * std::tanh(away / 0.02);
-      EXPECT_NEAR(dx[0], speed, 1e-15);
-      EXPECT_NEAR(dx[1], torque / 3e-3, 1e-9);
-      EXPECT_NEAR(dx[2], (13.0 * 0.3 - 1.2 * 0.7 - 17.0 * 0.018 * speed) / 2e-3, 1e-9);
-      EXPECT_NEAR(plant.output(c, x), (0.14 + away) * 180.0 / M_PI, 1e-12);
-    }
-  }
-  EXPECT_EQ(SmoothPlant{}, (SmoothPlant{2e-3, 20.0, 1e-3, 12.0}));
-  EXPECT_EQ(SmoothPlant::n_states, 3);
-  EXPECT_EQ(SmoothPlant::n_inputs, 1);
-  EXPECT_EQ(SmoothPlant::n_parameters, 10);
 }
 
 }  // namespace

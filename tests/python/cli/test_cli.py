@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mgdd import datasets, io, presets
+from mgdd import datasets, io
 from mgdd.cli import main
 from mgdd.engine import Cylinder, OperatingPoint, find_optimum, simulate
 from typed import Capsys, refused
@@ -83,17 +83,6 @@ def test_output_file_holds_the_traces(tmp_path: Path, capsys: Capsys) -> None:
     cycle = simulate(Cylinder(), OperatingPoint())
     np.testing.assert_array_equal(table[:, names.index("pressure_bar")], cycle["pressure_bar"].values)
     assert "ending" in refused(capsys, "engine", "simulate", "-o", str(tmp_path / "cycle.xls"))
-
-
-def test_analyze_measured_trace(files: tuple[list[str], str], capsys: Capsys) -> None:
-    out = run_json(capsys, "engine", "analyze", files[0][1], *HD)
-    assert out["ca50_cad"] == pytest.approx(6.9, abs=0.05)
-    assert out["imep_closed_bar"] == pytest.approx(13.71, abs=0.005)
-    assert out["n_compression"] == pytest.approx(1.382, abs=0.002)
-    assert out["heat_net_j"] == pytest.approx(4436.0, abs=1.0)
-    assert out["method"] == "none"
-    assert out["gamma"] == 1.33
-    assert {"pegging_bar", "n_expansion", "ca10_cad", "ca90_cad", "heat_gross_j", "p_max_bar", "p_max_cad"} <= set(out)
 
 
 def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: Capsys) -> None:
@@ -288,15 +277,6 @@ def test_infeasible_limit_has_its_own_exit_code(capsys: Capsys) -> None:
     error = refused(capsys, "engine", "optimum", "--limit", "p_max_bar=50", code=3)
     assert "p_max_bar >=" in error
     assert "is not an indicator" in refused(capsys, "engine", "optimum", "--limit", "p_maxx=50")
-
-
-def test_preset_file_round_trip(tmp_path: Path, capsys: Capsys) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text(presets.load("puma_single").to_toml().replace("value = 86.0", "value = 90.0"))
-    out = run_json(capsys, "engine", "simulate", "--preset", str(file))
-    assert out["imep_gross_bar"] == pytest.approx(
-        float(simulate(Cylinder(bore_mm=90.0, stroke_mm=90.0), OperatingPoint())["imep_gross_bar"])
-    )
 
 
 def test_process_keeps_stdout_clean() -> None:

@@ -46,6 +46,7 @@ engine simulate --rpm 1500 -> '--speed-rpm'
 engine simulate -v -> as in mgdd engine simulate
 engine simulate --output x.csv = engine simulate
 engine analyze -> as in mgdd engine analyze mean.csv
+engine analyze x.csv --report p.html --interactive -> pages of --report show the values under the pointer
 engine seek --method newton -> '--seeker' or '--seeker-set'
 engine seek --iterations 20 -> '--cycles'
 engine optimum --limits p_max_bar=95 -> '--limit'

@@ -63,7 +63,7 @@ def region() -> FeasibleRegion:
     preset = presets.load("puma_single")
 
     def indicators(columns: dict[str, Any]) -> dict[str, Any]:
-        return {"p_max_bar": sweep(preset.cylinder, preset.point, columns, points=True)["p_max_bar"].to_numpy()}
+        return {"p_max_bar": sweep(preset.cylinder, preset.point, columns, pointwise=True)["p_max_bar"].to_numpy()}
 
     return FeasibleRegion.of_model(indicators, {"p_max_bar": 140.0})
 

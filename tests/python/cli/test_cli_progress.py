@@ -1,4 +1,4 @@
-"""What the command line says while it works and when it fails: lines and bars on stderr, errors as JSON on stdout."""
+"""What the command line says while it works and when it fails, and the keys of its JSON."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -248,3 +249,24 @@ def test_ctrl_c_while_a_figure_is_written_leaves_the_result(
     assert main([*command, "-o", "result.json"]) == 130
     assert (tmp_path / "result.json").stat().st_size > 100
     assert "the result is printed" in capsys.readouterr().err
+
+
+KEYS = Path(__file__).parents[2] / "data" / "json_keys.json"
+WRITTEN: dict[str, str] = json.loads(KEYS.read_text(encoding="utf-8"))
+
+
+def paths(value: Any, above: str = "") -> Iterator[str]:
+    """Name every number and text by the keys that lead to it; an entry of a list is like its first."""
+    if isinstance(value, dict) and value:
+        for key, below in value.items():
+            yield from paths(below, f"{above}.{key}" if above else str(key))
+    elif isinstance(value, list) and value:
+        yield from paths(value[0], f"{above}[]")
+    else:
+        yield above
+
+
+@pytest.mark.parametrize("command", WRITTEN)
+def test_keys_stay(command: str, capsys: Capsys) -> None:
+    assert main([*command.split(), "--json"]) == 0
+    assert sorted(paths(json.loads(capsys.readouterr().out))) == WRITTEN[command].split(" ")

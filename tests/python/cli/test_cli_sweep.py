@@ -87,7 +87,7 @@ def test_points_of_a_file_are_simulated(ending: str, tmp_path: Path, capsys: Cap
     assert told["interrupted"] is False
     preset = presets.load("puma_single")
     columns = {"bore_mm": [80.0, 90.0, 85.0], "soc_cad": [-12.0, 0.5, -3.0]}
-    expected = sweep(preset.cylinder, preset.point, columns, points=True, outputs=["p_max_bar", "ca50_cad"])
+    expected = sweep(preset.cylinder, preset.point, columns, pointwise=True, outputs=["p_max_bar", "ca50_cad"])
     if ending == "nc":
         with xr.open_dataset(file, engine="scipy") as found:
             np.testing.assert_array_equal(found["p_max_bar"], expected["p_max_bar"])

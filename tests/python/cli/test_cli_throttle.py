@@ -82,8 +82,6 @@ def test_excite_refuses_what_leaves_the_window(capsys: Capsys, tmp_path: Path) -
         (("--low-hz", "0.5"), "--low-hz acts on a signal of your own only"),
         (("--offset", "0.5", "--amplitude", "0.9"), "the duty passes ±1"),
         (("--angle-window-deg", "50", "10"), "--angle-window-deg = (50, 10)"),
-        (("--preset", "puma_single"), "throttle"),
-        (("--set", "coulomb=0.2"), "did you mean 'coulomb_nm'"),
         (("-o", "chirp.txt"), "the ending must be one of .csv, .json"),
     ],
 )
@@ -232,13 +230,11 @@ def test_a_file_drives_the_run_and_the_run_becomes_a_file(tmp_path, capsys: Caps
     [
         (("--duty", "1.2"), "duty = 1.2 at sample 0: must be in [-1, 1]; a duty in percent is divided by 100"),
         (("--duty", "1", "--preset", "puma_single"), "'puma_single' is an engine, not a throttle"),
-        (("--duty", "1", "--preset", "P9"), "no preset 'P9'"),
         (("--duty", "1", "--set", "coulomb=1"), "no field 'coulomb'; did you mean"),
         (("--duty", "1", "--set", "foo=1"), "no field 'foo'; the fields are "),
         (("--duty", "1", "--set", "foo=1"), ", coulomb_nm, "),
         (("--duty", "1", "--set", "coulomb_nm=much"), "coulomb_nm = 'much': must be a number [N m]"),
         (("--duty", "1", "--set", "coulomb_nm"), "--set coulomb_nm: write FIELD=VALUE"),
-        (("--duty", "1", "--output", "run.txt"), "the ending must be one of .json, .csv"),
         (("--duty", "1", "--figure", "run.bmp"), "the ending must be one of .png, .svg, .pdf"),
         (("--input", "nowhere.csv"), "nowhere.csv"),
     ],

@@ -62,21 +62,6 @@ def test_its_settings_make_it_again_and_a_reset_is_a_new_one(name: str) -> None:
     ]
 
 
-@pytest.mark.parametrize("kind", [Pid, SlidingMode])
-def test_every_setting_has_unit_bounds_and_meaning_and_refuses_by_name(kind: type[Pid | SlidingMode]) -> None:
-    described = kind.fields()
-    assert set(described) == set(kind().settings)
-    for name, field in described.items():
-        assert field["meaning"]
-        assert kind().settings[name] == field["default"]
-        if "choices" in field:
-            continue
-        with pytest.raises(ParameterError) as error:
-            kind(**{name: math.nan})
-        assert error.value.field == name
-        assert error.value.bound
-
-
 def test_a_refused_state_changes_nothing() -> None:
     pid = KINDS["pid"]()
     pid.step(40.0, 39.0)

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import http.server
-import os
 import subprocess
 import sys
-import threading
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mgdd import datasets
-from mgdd.datasets.files import ORIGINS, Origin, fetch, path
+from mgdd.datasets.files import path
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
 from mgdd.results.labels import ANGLE, check_labels
@@ -112,21 +107,11 @@ def test_the_data_folder_comes_first(monkeypatch, tmp_path):
 def test_only_what_a_reader_reads_is_available(monkeypatch, tmp_path):
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     (tmp_path / "bench_7").mkdir()
-    (tmp_path / "emps").mkdir()
-    (tmp_path / "emps" / "DATA_EMPS.mat").write_text("one of its two files")
+    (tmp_path / "advisor_engine_maps").mkdir()
+    (tmp_path / "advisor_engine_maps" / "vw_1.9tdi_ornl_hot.csv").write_text("one of its two files")
     assert datasets.names() == (NAME,)
-    (tmp_path / "emps" / "DATA_EMPS_PULSES.mat").write_text("the other")
-    assert datasets.names() == ("emps", NAME)
-
-
-def test_the_tanks_are_sampled_every_four_seconds(monkeypatch, tmp_path):
-    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
-    (tmp_path / "cascaded_tanks").mkdir()
-    rows = '"uEst","uVal","yEst","yVal","Ts",\n3.2,0.9,5.2,4.9,4,\n3.3,1.0,5.3,4.8,,\n3.4,1.1,5.4,4.7,,\n'
-    (tmp_path / "cascaded_tanks" / "dataBenchmark.csv").write_text(rows)
-    first, second = datasets.read("cascaded_tanks")
-    assert first["time_s"].values.tolist() == second["time_s"].values.tolist() == [0.0, 4.0, 8.0]
-    assert (first["pump_v"].values[1], second["level_v"].values[2]) == (3.3, 4.7)
+    (tmp_path / "advisor_engine_maps" / "mercedes_1.7_ornl_hot.csv").write_text("the other")
+    assert datasets.names() == ("advisor_engine_maps", NAME)
 
 
 def test_another_export_of_the_hydrogen_engine_is_refused(monkeypatch, tmp_path):
@@ -168,108 +153,7 @@ def test_a_changed_packaged_file_is_refused(monkeypatch, tmp_path):
 
 
 def test_an_unknown_set_and_an_option_of_another_are_refused():
-    with pytest.raises(ParameterError, match="data set 'moon': must be one of advisor_engine_maps, cascaded_tanks"):
+    with pytest.raises(ParameterError, match="data set 'moon': must be one of advisor_engine_maps, h2df_502"):
         datasets.read("moon")
     with pytest.raises(ParameterError, match="only 'h2df_502' has them"):
         datasets.read(NAME, mask_held=False)
-
-
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        """Say nothing."""
-
-
-class Server:
-    """A folder on this machine, served over HTTP."""
-
-    def __init__(self, folder):
-        handler = partial(Quiet, directory=str(folder))
-        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-        threading.Thread(target=self.server.serve_forever, daemon=True).start()
-        self.url = f"http://127.0.0.1:{self.server.server_port}"
-
-
-@pytest.fixture
-def served(tmp_path, monkeypatch):
-    """A set of two files with known hashes, and an empty cache."""
-    pytest.importorskip("pooch")
-    folder = tmp_path / "served"
-    folder.mkdir()
-    files = {"a.csv": b"t,u\n0,1\n", "b.csv": b"t,u\n0,2\n"}
-    for file, content in files.items():
-        (folder / file).write_bytes(content)
-    server = Server(folder)
-    origins = {
-        "moon": {f: Origin(f"{server.url}/{f}", hashlib.sha256(content).hexdigest()) for f, content in files.items()}
-    }
-    monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "ORIGINS", origins)
-    monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "own"))
-    yield folder
-    server.server.shutdown()
-    server.server.server_close()
-
-
-def test_a_set_is_fetched_once_and_found(served, tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"or fetch it: mgdd\.datasets\.read\('moon', fetch=True\)"):
-        path("moon", "a.csv")
-    assert datasets.names() == (NAME,)
-    folder = fetch("moon")
-    assert folder == tmp_path / "cache" / "moon"
-    assert path("moon", "a.csv").read_bytes() == b"t,u\n0,1\n"
-    assert datasets.names() == (NAME, "moon")
-    for file in served.iterdir():
-        file.unlink()
-    assert fetch("moon") == folder
-    own = tmp_path / "own" / "moon" / "a.csv"
-    own.parent.mkdir(parents=True)
-    own.write_text("mine")
-    assert path("moon", "a.csv") == own
-
-
-def test_only_what_is_missing_is_fetched(monkeypatch, tmp_path):
-    asked = []
-    monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "fetch", asked.append)
-    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
-    monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path))
-    assert len(datasets.read(NAME, fetch=True)) == 4
-    assert asked == []
-    with pytest.raises(FileNotFoundError, match=r"read\('emps', fetch=True\)"):
-        datasets.read("emps", fetch=True)
-    assert asked == ["emps"]
-
-
-def test_another_file_is_refused_and_a_right_one_follows(served):
-    good = (served / "b.csv").read_bytes()
-    (served / "b.csv").write_bytes(b"changed")
-    with pytest.raises(DataError, match=r"b\.csv: is not the known file"):
-        fetch("moon")
-    assert "moon" not in datasets.names()
-    (served / "b.csv").unlink()
-    with pytest.raises(DataError, match=r"b\.csv: cannot be fetched: .*put the file into \$MGDD_DATA_DIR/moon by hand"):
-        fetch("moon")
-    (served / "b.csv").write_bytes(good)
-    fetch("moon")
-    assert "moon" in datasets.names()
-
-
-@pytest.mark.usefixtures("served")
-def test_without_pooch_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pooch", None)
-    with pytest.raises(ImportError, match=r"pip install 'mgdd\[datasets\]'"):
-        fetch("moon")
-    assert datasets.names() == (NAME,)
-
-
-@pytest.mark.parametrize(("name", "file"), [(name, file) for name, files in ORIGINS.items() for file in files])
-def test_the_known_hashes_are_those_of_the_records_at_hand(name, file):
-    folder = os.environ.get("MGDD_DATA_DIR")
-    if not folder or not (Path(folder) / name / file).is_file():
-        pytest.skip(f"{name}/{file} is not at hand")
-    assert hashlib.sha256((Path(folder) / name / file).read_bytes()).hexdigest() == ORIGINS[name][file].sha256
-    assert ORIGINS[name][file].url.endswith(file)
-
-
-def test_a_set_without_an_address_is_not_fetched():
-    with pytest.raises(ParameterError, match="must be one of cascaded_tanks, emps, wh2009 to be fetched"):
-        fetch("h2df_502")

@@ -37,7 +37,7 @@ def record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_figures_of_chunks_are_those_of_the_whole(record: Path) -> None:
-    options: dict[str, Any] = {"traces": False, "gamma": 1.2, "fuel_mg": 40.0, "quiet": True}
+    options: dict[str, Any] = {"keep_traces": False, "gamma": 1.2, "fuel_mg": 40.0, "quiet": True}
     whole = analyze(read_pressure(record), "puma_single", **options)
     parts = analyze(pressure_chunks(record, cycles=8), "puma_single", **options)
     xr.testing.assert_identical(parts, whole)
@@ -53,7 +53,7 @@ def test_the_spectrum_of_chunks_is_that_of_the_whole() -> None:
     wave = np.exp(-ms) * np.sin(2.0 * np.pi * 6.5 * ms)
     loud = np.array([0.0, 0.0, 0.0, 1.0, 2.0])[:, None]
     whole = pressure_trace(run[ANGLE], run["pressure_bar"].to_numpy() + loud * wave).assign_attrs(speed_rpm=1500.0)
-    options: dict[str, Any] = {"traces": False, "quiet": True, "knock_threshold_bar": 0.5}
+    options: dict[str, Any] = {"keep_traces": False, "quiet": True, "knock_threshold_bar": 0.5}
     figures = [
         analyze(each, "puma_single", **options)
         for each in (whole, iter([whole.isel(cycle=slice(0, 3)), whole.isel(cycle=slice(3, None))]))
@@ -64,25 +64,25 @@ def test_the_spectrum_of_chunks_is_that_of_the_whole() -> None:
 
 
 def test_chunks_give_no_traces(record: Path) -> None:
-    with pytest.raises(ParameterError, match=r"traces = True: .*pass traces=False"):
+    with pytest.raises(ParameterError, match=r"keep_traces = True: .*pass keep_traces=False"):
         analyze(pressure_chunks(record), "puma_single")
     with pytest.raises(DataError, match="no chunk: each must be pressure_bar"):
-        analyze(iter([]), "puma_single", traces=False)
+        analyze(iter([]), "puma_single", keep_traces=False)
     other = [next(pressure_chunks(record, cycles=4)).isel({ANGLE: slice(k, None)}) for k in (0, 1)]
     with pytest.raises(DataError, match="the chunk from cycle 5 on has other crank angles"):
-        analyze(iter(other), "puma_single", traces=False)
+        analyze(iter(other), "puma_single", keep_traces=False)
 
 
 def test_a_cycle_that_is_refused_is_counted_from_the_first_chunk_on(record: Path) -> None:
     chunks = list(pressure_chunks(record, cycles=8))
     chunks[2]["pressure_bar"][3, 40] = np.nan
     with pytest.raises(DataError, match=r"from cycle 17 on, .*cycle 4"):
-        analyze(iter(chunks), "puma_single", traces=False)
+        analyze(iter(chunks), "puma_single", keep_traces=False)
 
 
 def test_indicating_takes_chunk_after_chunk(record: Path) -> None:
     whole = read_pressure(record)
-    indicating = Indicating(whole[ANGLE], "puma_single", speed_rpm=1500.0)
+    indicating = Indicating("puma_single", whole[ANGLE], speed_rpm=1500.0)
     parts = [indicating.record(each["pressure_bar"])["imep_net_bar"] for each in pressure_chunks(record, cycles=8)]
     np.testing.assert_array_equal(np.concatenate(parts), indicating.record(whole["pressure_bar"])["imep_net_bar"])
 
@@ -110,7 +110,7 @@ from mgdd.io import pressure_chunks, pressure_trace, read_pressure
 from mgdd.io.any_table import read_any_table
 simulate("puma_single", {"speed_rpm": 1500.0})
 small, file = sys.argv[1:]
-options = dict(traces=False, quiet=True)
+options = dict(keep_traces=False, quiet=True)
 analyze(pressure_chunks(small, cycles=10), "puma_single", **options)
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))
 limit = 1024 * int(status["VmSize"].split()[0]) + 50_000_000

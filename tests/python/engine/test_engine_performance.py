@@ -145,7 +145,7 @@ def test_measured_pressure_gives_the_no_of_the_cycle_behind_it() -> None:
 
 def test_the_fit_finds_mixture_and_factor_of_another_plant(sweep) -> None:
     cycles, points, nox = sweep
-    found = ThermalNo(mixing_time_ms=1.5).fit(cycles, nox, Cylinder(), points=points)
+    found = ThermalNo(mixing_time_ms=1.5).fit(cycles, nox, Cylinder(), point=points)
     assert found.points == 12
     assert found.lambda_low <= 1.02 <= found.lambda_high
     assert found.model.lambda_burned == pytest.approx(1.02, abs=0.05)
@@ -153,7 +153,7 @@ def test_the_fit_finds_mixture_and_factor_of_another_plant(sweep) -> None:
     assert 0.01 < found.residual_ln < 0.06
     assert found.doubts == ()
     exact = [float(TRUE.cycle(c, Cylinder(), point=p)["nox_ppm"]) for c, p in zip(cycles, points, strict=True)]
-    sharp = ThermalNo(mixing_time_ms=1.5).fit(cycles, exact, Cylinder(), points=points)
+    sharp = ThermalNo(mixing_time_ms=1.5).fit(cycles, exact, Cylinder(), point=points)
     assert sharp.doubts == ()
     assert sharp.model.lambda_burned == pytest.approx(1.02, abs=0.01)
     assert sharp.lambda_high - sharp.lambda_low < 0.5 * (found.lambda_high - found.lambda_low)
@@ -162,7 +162,7 @@ def test_the_fit_finds_mixture_and_factor_of_another_plant(sweep) -> None:
 def test_a_fitted_half_tells_the_other_half_where_a_proxy_of_temperature_does_not(sweep) -> None:
     cycles, points, nox = sweep
     low, high = slice(0, 6), slice(6, 12)  # loads
-    found = ThermalNo().fit(cycles[low], nox[low], Cylinder(), points=points[low]).model
+    found = ThermalNo().fit(cycles[low], nox[low], Cylinder(), point=points[low]).model
     told = [
         float(found.cycle(c, Cylinder(), point=p)["nox_ppm"]) for c, p in zip(cycles[high], points[high], strict=True)
     ]
@@ -175,15 +175,15 @@ def test_a_fitted_half_tells_the_other_half_where_a_proxy_of_temperature_does_no
 
 def test_few_or_like_cycles_are_doubted(sweep) -> None:
     cycles, points, nox = sweep
-    one = ThermalNo().fit(cycles[:1], nox[:1], Cylinder(), points=points[0])
+    one = ThermalNo().fit(cycles[:1], nox[:1], Cylinder(), point=points[0])
     assert "1 cycle(s): the mixture stays 1.1" in one.doubts[0]
     assert np.isnan(one.residual_ln)
     again = ThermalNo(calibration=one.model.calibration).cycle(cycles[0], Cylinder(), point=points[0])
     assert float(again["nox_ppm"]) == pytest.approx(nox[0], rel=1e-12)
     noisy = nox[2] * np.array([1.0, 0.7, 1.3, 0.9])
-    alike = ThermalNo().fit([cycles[2]] * 4, noisy, Cylinder(), points=points[2])
+    alike = ThermalNo().fit([cycles[2]] * 4, noisy, Cylinder(), point=points[2])
     assert "leave the mixture open" in alike.doubts[0]
-    grams = ThermalNo().fit(cycles[:1], nox[:1] * 1e-6, Cylinder(), points=points[0])
+    grams = ThermalNo().fit(cycles[:1], nox[:1] * 1e-6, Cylinder(), point=points[0])
     assert "unit of nox_ppm" in grams.doubts[1]
 
 
@@ -210,11 +210,11 @@ def test_bad_input_is_refused_by_name(sweep) -> None:
     with pytest.raises(DataError, match="give one cycle"):
         ThermalNo().cycle(cycles[0].expand_dims(cycle=[1, 2]), Cylinder(), point=points[0])
     with pytest.raises(DataError, match=r"nox_ppm\[1\] = -3.0: must be > 0|nox_ppm\[1\] = -3"):
-        ThermalNo().fit(cycles[:2], [100.0, -3.0], Cylinder(), points=points[0])
+        ThermalNo().fit(cycles[:2], [100.0, -3.0], Cylinder(), point=points[0])
     with pytest.raises(ShapeError, match="2 cycles, 3 values of nox_ppm"):
-        ThermalNo().fit(cycles[:2], nox[:3], Cylinder(), points=points[0])
+        ThermalNo().fit(cycles[:2], nox[:3], Cylinder(), point=points[0])
     with pytest.raises(DataError, match="no cycle"):
-        ThermalNo().fit([], [], Cylinder(), points=points[0])
+        ThermalNo().fit([], [], Cylinder(), point=points[0])
     with pytest.raises(ParameterError, match="exhaust_kg_per_h = 0"):
         nox_g_per_kwh(100.0, exhaust_kg_per_h=0.0, power_kw=1.0)
     with pytest.raises(ParameterError, match=r"intake_water_fraction = 0\.5"):

@@ -173,23 +173,6 @@ def test_a_motored_peak_far_from_tdc_is_noticed(caplog):
     assert "TDC" in caplog.text
 
 
-def test_a_suspect_compression_is_noticed():
-    cycle = simulate(CYLINDER, POINT)
-    warnings = analyze(moved(cycle, pressure=-0.5), CYLINDER, point=POINT).attrs["warnings"]
-    assert "polytropic exponent of compression" in warnings
-
-
-def test_noise_hardly_moves_work_and_middle():
-    cycle = simulate(CYLINDER, POINT, step_cad=0.5)
-    clean = analyze(moved(cycle), CYLINDER, point=POINT)
-    noise = np.random.default_rng(5).normal(0.0, 0.05, cycle.sizes["crank_angle_cad"])
-    noisy = analyze(
-        pressure_trace(cycle.crank_angle_cad.values, cycle.pressure_bar.values + noise), CYLINDER, point=POINT
-    )
-    assert float(noisy.imep_closed_bar) == pytest.approx(float(clean.imep_closed_bar), rel=2e-3)
-    assert float(noisy.ca50_cad) == pytest.approx(float(clean.ca50_cad), abs=0.2)
-
-
 def test_a_missing_mass_comes_from_the_state_at_ivc():
     cylinder, trace = presets.load("hd_diesel_128x144").cylinder, datasets.read("hd_diesel_128x144")[2]
     stated = analyze(trace, cylinder)
@@ -278,18 +261,7 @@ def test_smoothing_acts_on_heat_only_and_says_so():
         roughness = [float(np.abs(np.diff(r.heat_release_net_j_per_cad)).max()) for r in (smooth, rough)]
         assert roughness[0] < 0.3 * roughness[1]
     assert rough.attrs["smoothing"] == "none"
-
-
-def test_the_rise_rate_does_not_depend_on_the_sampling():
-    cylinder = CYLINDER.replace(burn_shape="wiebe")
-    point = POINT.replace(burn_duration_cad=20.0)
-    fine = moved(simulate(cylinder, point, step_cad=0.1))
-    rates = []
-    for stride in (1, 2, 5, 10):
-        part = analyze(fine.isel(crank_angle_cad=slice(None, None, stride)), cylinder, point=point)
-        rates.append(float(part.dp_max_bar_per_cad))
-        assert part.attrs["dp_max"] == "slope of the least-squares line over 2 °CA"
-    np.testing.assert_allclose(rates, rates[0], rtol=0.01)
+    assert rough.attrs["dp_max"] == "slope of the least-squares line over 2 °CA"
 
 
 def test_a_stated_brake_work_is_held_against_the_gas():
@@ -318,8 +290,15 @@ def test_a_stated_intake_pressure_is_held_against_the_trace():
     assert analyze(trace, CYLINDER, point=POINT, inlet_pressure_kpa=110.0).attrs["warnings"] == ""
     # A point is often that of another load: only what no load explains is doubted.
     assert analyze(trace, CYLINDER, point=POINT.replace(intake_pressure_kpa=260.0)).attrs["warnings"] == ""
-    megapascal = trace.assign(pressure_bar=trace.pressure_bar * 0.1)
-    assert "looks like MPa" in analyze(megapascal, CYLINDER, point=POINT).attrs["warnings"]
+    low, thin = CYLINDER.replace(compression_ratio=9.0), OperatingPoint(fuel_mg=1.0, intake_pressure_kpa=100.0)
+    for factor, cylinder, point, said in (
+        (0.1, CYLINDER, POINT, "looks like MPa"),
+        (4.0, CYLINDER, POINT, "fits no common unit"),
+        (14.504, low, thin, "looks like psi"),
+    ):
+        other = moved(simulate(cylinder, point)).assign_attrs(intake_pressure_kpa=point.intake_pressure_kpa)
+        other = other.assign(pressure_bar=other.pressure_bar * factor)
+        assert said in analyze(other, cylinder, point=point).attrs["warnings"]
 
 
 def test_conditions_come_from_the_trace_before_the_point():
@@ -394,8 +373,3 @@ def test_the_stated_brake_work_shows_a_wrong_gain():
     gross = float(simulate(CYLINDER, POINT, soc_cad=-4.0)["imep_gross_bar"])
     assert analysed(bmep_bar=gross - 1.5).attrs["warnings"] == ""
     assert "above the stated BMEP" in analysed(bmep_bar=gross - 6.5).attrs["warnings"]
-
-
-def test_the_measured_traces_are_not_doubted():
-    cylinder = presets.load("hd_diesel_128x144").cylinder
-    assert [analyze(t, cylinder, quiet=True).attrs["warnings"] for t in datasets.read("hd_diesel_128x144")] == [""] * 4

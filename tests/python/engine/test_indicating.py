@@ -27,7 +27,7 @@ def record(n: int = 40, *, seed: int = 3, share: np.ndarray | None = None) -> np
 
 
 def indicating(**options: object) -> Indicating:
-    return Indicating(ANGLE, "puma_single", speed_rpm=SPEED_RPM, **options)
+    return Indicating("puma_single", ANGLE, speed_rpm=SPEED_RPM, **options)
 
 
 def test_a_stream_gives_what_the_record_gives():
@@ -88,7 +88,7 @@ def test_misfires_and_partial_burns_are_named():
     share[[4, 21]], share[13] = 0.0, 0.55
     trace = pressure_trace(ANGLE, record(share=share), name="bench 3").assign_attrs(speed_rpm=SPEED_RPM)
     for traces in (True, False):
-        made = analyze(trace, "puma_single", traces=traces, quiet=True)
+        made = analyze(trace, "puma_single", keep_traces=traces, quiet=True)
         assert made["cycle"][made["misfire"].to_numpy()].values.tolist() == [5, 22]
         assert made["cycle"][made["partial_burn"].to_numpy()].values.tolist() == [14]
         assert "2 of 40 cycles do not burn: cycle 5, 22" in made.attrs["warnings"]
@@ -105,7 +105,7 @@ def test_motored_records_have_no_misfires():
 def test_without_traces_the_figures_are_the_same() -> None:
     trace = pressure_trace(ANGLE, record(25), name="bench 3").assign_attrs(speed_rpm=SPEED_RPM)
     whole = analyze(trace, "puma_single", quiet=True)
-    short = analyze(trace, "puma_single", traces=False, quiet=True)
+    short = analyze(trace, "puma_single", keep_traces=False, quiet=True)
     check_labels(short)
     assert "crank_angle_cad" not in short.variables
     assert short.attrs == whole.attrs
@@ -115,7 +115,9 @@ def test_without_traces_the_figures_are_the_same() -> None:
 def test_in_one_window_without_smoothing_the_analysis_finds_the_same() -> None:
     pressure = record(12)
     trace = pressure_trace(ANGLE, pressure).assign_attrs(speed_rpm=SPEED_RPM)
-    whole = analyze(trace, "puma_single", traces=False, quiet=True, heat_window_cad=(-12.0, 70.0), smoothing="none")
+    whole = analyze(
+        trace, "puma_single", keep_traces=False, quiet=True, heat_window_cad=(-12.0, 70.0), smoothing="none"
+    )
     made = indicating(heat_window_cad=(-12.0, 70.0)).record(pressure)
     for name in ("imep_net_bar", "imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "mapo_bar", "n_compression"):
         np.testing.assert_array_equal(made[name], whole[name])
@@ -151,11 +153,11 @@ def test_a_ringing_of_6500_hertz_stands_in_its_band():
 def test_options_are_checked(change: dict[str, object], error: type[Exception] | None, words: str):
     options = {"speed_rpm": SPEED_RPM, **change}
     if error is None:
-        made = Indicating(ANGLE, "puma_single", **options).cycle(record(1)[0])
+        made = Indicating("puma_single", ANGLE, **options).cycle(record(1)[0])
         assert np.isnan(made["mapo_bar"])  # no speed, no band
         return
     with pytest.raises(error, match=words):
-        Indicating(ANGLE, "puma_single", **options)
+        Indicating("puma_single", ANGLE, **options)
 
 
 def test_bad_cycles_are_refused_by_name():
@@ -171,4 +173,4 @@ def test_bad_cycles_are_refused_by_name():
     with pytest.raises(ShapeError, match="one cycle"):
         indicating().cycle(pressure[:2])
     with pytest.raises(ParameterError, match="traces"):
-        analyze(pressure_trace(ANGLE, pressure[0]), "puma_single", traces=False)
+        analyze(pressure_trace(ANGLE, pressure[0]), "puma_single", keep_traces=False)

@@ -68,7 +68,8 @@ def test_noise_of_few_cycles_passes_for_ringing_in_a_few_of_a_hundred_records_at
     angle, rows = calm["crank_angle_cad"], calm["pressure_bar"].to_numpy()
     noisy = (pressure_trace(angle, rows + rng.normal(0.0, 0.03, rows.shape)) for _ in range(100))
     found = [
-        float(figures(trace.assign_attrs(speed_rpm=1400.0), traces=False)["ringing_frequency_khz"]) for trace in noisy
+        float(figures(trace.assign_attrs(speed_rpm=1400.0), keep_traces=False)["ringing_frequency_khz"])
+        for trace in noisy
     ]
     assert np.count_nonzero(np.isfinite(found)) <= 3
 
@@ -120,7 +121,7 @@ def test_the_share_of_knocking_cycles_is_given_with_a_threshold_only() -> None:
 
 def test_the_spectrum_is_a_trace() -> None:
     trace = record(0.5)
-    short, whole = figures(trace, traces=False), figures(trace)
+    short, whole = figures(trace, keep_traces=False), figures(trace)
     assert "frequency_khz" not in short.variables
     assert float(short["ringing_frequency_khz"]) == float(whole["ringing_frequency_khz"])
     assert whole.attrs["knock_band_hz"] == (4000.0, 20000.0)
@@ -170,7 +171,7 @@ def test_traces_of_cycles_are_drawn_as_colours() -> None:
         float(made["heat_release_net_j_per_cad"].sel(crank_angle_cad=inside["crank_angle_cad"]).max())
     )
     trace = record(0.5)
-    sound = Indicating(trace["crank_angle_cad"], "puma_single", speed_rpm=1400.0).oscillation(trace["pressure_bar"])
+    sound = Indicating("puma_single", trace["crank_angle_cad"], speed_rpm=1400.0).oscillation(trace["pressure_bar"])
     assert plot.cycles(sound, "oscillation_bar").get_legend() is None
     motored = made.assign(heat_release_net_j_per_cad=np.nan * made["heat_release_net_j_per_cad"])
     motored["heat_release_net_j_per_cad"].attrs = made["heat_release_net_j_per_cad"].attrs

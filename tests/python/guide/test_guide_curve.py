@@ -24,7 +24,7 @@ def parabola(best: float = 3.0) -> Curve:
 
 
 def seeking(**other: Any) -> CurveSeeking:
-    return CurveSeeking(**{"start": 3.0, "lower": -30.0, "upper": 10.0, "curve": parabola(), **other})
+    return CurveSeeking(**{"start": 3.0, "bounds": (-30.0, 10.0), "curve": parabola(), **other})
 
 
 def seek(seeker: Any, cycles: int, seed: int = 0) -> list[float]:
@@ -64,7 +64,7 @@ def test_points_that_make_no_curve_are_refused(inputs: list[float], values: list
 @pytest.mark.parametrize(
     ("spoilt", "said"),
     [
-        ({"upper": np.inf}, "upper = inf: must be finite"),
+        ({"bounds": (-30.0, np.inf)}, "upper = inf: must be finite"),
         ({"curve": Curve([0.0, 1.0, 2.0], [0.0, 1.0, 2.5])}, "does not bend down"),
         (
             {"curve": Curve(np.linspace(-30, 10, 9), [0.0, 2.0, 4.0, 6.0, 8.0, 2.0, 7.0, 4.0, 1.0])},
@@ -109,8 +109,7 @@ def test_limits_by_the_guides_curves_are_kept_while_it_arrives() -> None:
         assert curve is not None
         seeker = CurveSeeking(
             start=curve.best,
-            lower=-30.0,
-            upper=10.0,
+            bounds=(-30.0, 10.0),
             curve=curve,
             limits=[Limit("p_max_bar", 95.0)],
             limit_curves=drawn,
@@ -137,9 +136,9 @@ def guided(bench: VirtualEngine, *, calibrate: bool = True, plain: bool = False)
     model = ModelOptimum(ROUGH)
     curve = model.curve(bench.point)
     assert curve is not None
-    seeker: Any = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
+    seeker: Any = CurveSeeking(start=curve.best, bounds=(-30.0, 10.0), curve=curve)
     if plain:
-        seeker = ExtremumSeeking(start=-15.0, lower=-30.0, upper=10.0)
+        seeker = ExtremumSeeking(start=-15.0, bounds=(-30.0, 10.0))
     calibration = OnlineCalibration(ROUGH, steady_cycles=0, window_cycles=5) if calibrate else None
     return GuidedEngine(seeker, model, bench.point, calibration=calibration)
 
@@ -206,7 +205,7 @@ class WithoutPoint:
 
 
 def test_a_guide_that_would_never_be_asked_is_refused() -> None:
-    front = FeedForward(ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), lambda fuel_mg: -0.3 * fuel_mg)
+    front = FeedForward(ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0)), lambda fuel_mg: -0.3 * fuel_mg)
     with pytest.raises(ParameterError, match="would never be asked"):
         run_seeker(WithoutPoint(), front, 5)
     assert front.cycle == 0
@@ -216,7 +215,7 @@ def test_a_guide_that_would_never_be_asked_is_refused() -> None:
 
 def test_what_makes_no_guided_engine_is_refused() -> None:
     bench, model = VirtualEngine(), ModelOptimum(ROUGH)
-    plain = ExtremumSeeking(start=-15.0, lower=-30.0, upper=10.0)
+    plain = ExtremumSeeking(start=-15.0, bounds=(-30.0, 10.0))
     with pytest.raises(ParameterError, match="model = 3"):
         GuidedEngine(plain, 3, bench.point)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="calibration = 3"):
@@ -233,7 +232,7 @@ def test_a_feed_forward_runs_in_the_loop() -> None:
     schedule = [(0, OperatingPoint(fuel_mg=12.0)), (150, OperatingPoint(fuel_mg=30.0))]
     bench = VirtualEngine(schedule=schedule, seed=1)
     front = FeedForward(
-        ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), ModelOptimum(Cylinder(wall_heat_scale=0.65))
+        ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0)), ModelOptimum(Cylinder(wall_heat_scale=0.65))
     )
     run = run_seeker(bench, front, 300)
     jump = run.dataset["estimate"][:, 0].to_numpy()

@@ -16,7 +16,7 @@ from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Spsa
 from mgdd.optimize.optimum import Optimum
 
-SPACE: dict[str, Any] = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+SPACE: dict[str, Any] = {"start": -20.0, "bounds": (-30.0, 10.0)}
 
 
 def plant(x: float, optimum: float, noise: float = 0.0) -> float:
@@ -238,9 +238,7 @@ def test_the_test_of_a_guide_waits_for_the_sensors(lags: list[tuple[float, float
 
 
 def test_several_inputs_move_together() -> None:
-    seeker = ExtremumSeeking(
-        start=[8.0, -6.0], lower=-40.0, upper=40.0, amplitude=[1.0, 0.5], period=20, harmonics=[2, 3]
-    )
+    seeker = ExtremumSeeking(start=[8.0, -6.0], bounds=(-40.0, 40.0), amplitude=[1.0, 0.5], period=20, harmonics=[2, 3])
     ff = FeedForward(seeker, lambda fuel: [0.1 * fuel, -0.2 * fuel], noise_sd=0.1, calibration_rate=[1.0, 2.0])
     ff.at(20.0)
     assert ff.estimate == pytest.approx([2.0, -4.0])
@@ -253,7 +251,7 @@ def test_several_inputs_move_together() -> None:
 
 def test_the_loop_judges_the_limits_of_its_seeker() -> None:
     bench = VirtualEngine(limits=["p_max_bar"], seed=1)
-    seeker = ExtremumSeeking(start=0.4, lower=-30.0, upper=10.0, limits=[Limit("p_max_bar", 95.0)])
+    seeker = ExtremumSeeking(start=0.4, bounds=(-30.0, 10.0), limits=[Limit("p_max_bar", 95.0)])
     guided = FeedForward(seeker, lambda _: 0.0, trust=0.7)
     assert guided.settings["limits"][0].upper == 95.0
     assert (guided.settings["amplitude"], guided.settings["trust"]) == (seeker.settings["amplitude"], 0.7)

@@ -16,7 +16,7 @@ from mgdd.guide import FeedForward
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum
 
-SPACE: dict[str, Any] = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+SPACE: dict[str, Any] = {"start": -20.0, "bounds": (-30.0, 10.0)}
 LIMITS = [Limit(name="p_max_bar", upper=112.0)]
 FREE, LIMITED = (
     {name: make for name, make in stepped(**SPACE, **own).items() if name != "CurveSeeking"}

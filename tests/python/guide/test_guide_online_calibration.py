@@ -1,4 +1,4 @@
-"""Online calibration from Python: what it finds beside a running engine, its record, state, pickle and refusals."""
+"""On-line calibration from Python, and the best timing of its model."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from mgdd import datasets, presets
-from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.errors import ParameterError, ShapeError
-from mgdd.guide import OnlineCalibration
+from mgdd.engine import Cylinder, OperatingPoint, find_optimum
+from mgdd.errors import Error, ParameterError, ShapeError
+from mgdd.guide import ModelOptimum, OnlineCalibration
 from mgdd.identify import fit_cylinder
 from mgdd.loop import VirtualEngine
 from mgdd.optimize import ExtremumSeeking
@@ -40,7 +40,7 @@ def test_it_follows_an_engine_that_seeks_its_best_timing(method: str) -> None:
     bench = VirtualEngine(seed=3)
     alone = method == "extremum_seeking"  # then the timing must be measured: nothing else is fitted
     calibration = OnlineCalibration(WRONG, method=method, uncertainty=SURE if alone else ENGINE)
-    seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    seeker = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
     for _ in range(120):
         (soc_cad,) = seeker.ask()
         cycle = bench.step(soc_cad)
@@ -151,11 +151,59 @@ def test_a_refused_cycle_says_why() -> None:
         ({"window_cycles": 1}, "window_cycles = 1 cycles"),
         ({"method": "extremum_seeking", "parameters": ("tdc_offset_cad",)}, "wall_heat_scale alone"),
         ({"forgetting": 2.0}, "forgetting = 2"),
-        ({"engine": Cylinder(compression_ratio=1.5)}, "compression_ratio = 1.5"),
-        ({"engine": Cylinder(wall_temperature_k=200.0)}, "wall_temperature_k = 200"),
+        ({"cylinder": Cylinder(compression_ratio=1.5)}, "compression_ratio = 1.5"),
+        ({"cylinder": Cylinder(wall_temperature_k=200.0)}, "wall_temperature_k = 200"),
         ({"parameters": ("soc_variance_scale",), "soc_scatter_cad": 0.0}, "soc_scatter_cad = 0: must be above 0"),
     ],
 )
 def test_settings_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        OnlineCalibration(**{"engine": "puma_single", **arguments})
+        OnlineCalibration(**{"cylinder": "puma_single", **arguments})
+
+
+POINTS = [OperatingPoint(speed_rpm=n, fuel_mg=m) for n, m in ((1000.0, 8.0), (1500.0, 20.0), (2600.0, 35.0))]
+
+
+@pytest.mark.parametrize("method", ["gradient", "golden_section"])
+@pytest.mark.parametrize("point", POINTS)
+def test_finds_what_the_offline_search_finds(point: OperatingPoint, method: str) -> None:
+    guide = ModelOptimum(Cylinder(), method=method)
+    best, offline = guide(point), find_optimum(Cylinder(), point)
+    assert best is not None
+    assert best["soc_cad"] == pytest.approx(offline["soc_cad"], abs=0.06)
+    assert best.value == pytest.approx(100.0 * offline.value, abs=2e-3)
+    assert best.curvature == pytest.approx(100.0 * offline.curvature, rel=0.03)
+    assert guide(point) is best  # each point is searched once
+
+
+def test_a_calibration_is_searched_anew() -> None:
+    guide, hot = ModelOptimum(Cylinder()), Cylinder(wall_heat_scale=1.0)
+    before = guide(POINTS[1])
+    guide.calibrate(hot)
+    after, offline = guide(POINTS[1]), find_optimum(hot, POINTS[1])
+    assert before is not None
+    assert after is not None
+    assert after["soc_cad"] == pytest.approx(offline["soc_cad"], abs=0.06)
+    assert abs(after["soc_cad"] - before["soc_cad"]) > 2.0
+    with pytest.raises(ParameterError, match="geometry"):
+        guide.calibrate(Cylinder(bore_mm=90.0))
+    assert guide.cylinder == hot
+
+
+def test_knows_where_there_is_no_optimum() -> None:
+    assert ModelOptimum(Cylinder())(OperatingPoint(fuel_mg=0.0)) is None
+    with pytest.raises(ParameterError, match="point"):
+        ModelOptimum(Cylinder())((1500.0, 20.0))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"bounds_cad": (10.0, -30.0)}, "upper_cad"),
+        ({"bounds_cad": (-70.0, 10.0)}, "lower_cad"),
+        ({"method": "newton"}, "method"),
+    ],
+)
+def test_refused_settings_are_named(change: dict[str, Any], field: str) -> None:
+    with pytest.raises(Error, match=field):
+        ModelOptimum(Cylinder(), **change)

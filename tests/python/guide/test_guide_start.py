@@ -18,7 +18,7 @@ from mgdd.optimize import ExtremumSeeking, Seeker, Spsa
 from mgdd.optimize.optimum import Optimum
 
 START_CAD, GUIDE_CAD, PLANT_BEST_CAD = -18.0, -1.53, -5.63
-SPACE: dict[str, Any] = {"start": START_CAD, "lower": -30.0, "upper": 10.0}
+SPACE: dict[str, Any] = {"start": START_CAD, "bounds": (-30.0, 10.0)}
 ROUGH = ModelOptimum(Cylinder(wall_heat_scale=1.0))
 
 

@@ -87,7 +87,7 @@ def test_it_goes_on_from_a_file_and_a_pickle(tmp_path: Path) -> None:
 
 def test_inputs_without_names_and_components() -> None:
     seeker = GaussianProcessSeeking(
-        start=[4.0, 0.31], lower=[-25.0, 0.0], upper=[15.0, 0.4],
+        start=[4.0, 0.31], bounds=([-25.0, 0.0], [15.0, 0.4]),
         components=[ComponentLag(), ComponentLag(delay_cycles=3.0)],
         guide=[lambda x: -0.03 * (x[0] + 6.0) ** 2, lambda x: -200.0 * (x[1] - 0.25) ** 2],
     )  # fmt: skip

@@ -185,7 +185,7 @@ def settle(ff: FeedForward, fuel: float, cycles: int, seed: int = 0) -> None:
 
 def test_only_a_settled_estimate_is_confirmed() -> None:
     timing = timings(-20.0, {"fuel_mg": [10.0, 20.0, 40.0]})
-    ff = FeedForward(ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), timing)
+    ff = FeedForward(ExtremumSeeking(start=-20.0, bounds=(-30.0, 10.0)), timing)
     at = {"fuel_mg": 20.0}
     settle(ff, 20.0, 60)
     assert not timing.learn_from(ff, at)  # too short
@@ -204,7 +204,7 @@ def test_only_a_settled_estimate_is_confirmed() -> None:
 
 def test_a_map_that_has_learnt_makes_the_next_step_at_once() -> None:
     timing = timings(-10.0, {"fuel_mg": [10.0, 20.0, 40.0]})
-    ff = FeedForward(ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0), timing)
+    ff = FeedForward(ExtremumSeeking(start=-10.0, bounds=(-30.0, 10.0)), timing)
     for fuel in (10.0, 20.0, 40.0):
         settle(ff, fuel, 500, seed=int(fuel))
         assert timing.learn_from(ff, {"fuel_mg": fuel})

@@ -18,7 +18,7 @@ from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, On
 from mgdd.loop import LoopCriteria, VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, GaussianProcessSeeking, GradientDescent, Spsa
 
-SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -12.0, "bounds": (-30.0, 10.0)}
 GOAL = LoopCriteria(optimum=-6.0, arrival=2.0)
 CYCLES, SEED = 420, 11
 # Two steps of the load, of which the guide below says nothing and nonsense, a drift of 3 %, and one that it follows.
@@ -142,8 +142,8 @@ def test_a_guide_is_asked_once_at_every_point_and_once_more_where_it_gives_nothi
 
 
 def test_what_run_seeker_refuses_is_refused() -> None:
-    two = Spsa(start=[-12.0, 0.1], lower=[-30.0, 0.0], upper=[10.0, 0.5])
-    far = ExtremumSeeking(start=-70.0, lower=-90.0, upper=10.0)
+    two = Spsa(start=[-12.0, 0.1], bounds=([-30.0, 0.0], [10.0, 0.5]))
+    far = ExtremumSeeking(start=-70.0, bounds=(-90.0, 10.0))
     between = [FeedForward(ExtremumSeeking(**SPACE), by_fuel), SEEKERS["guided engine"]()]
     for seeker in between:
         seeker.ask()

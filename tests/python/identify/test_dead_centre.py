@@ -134,7 +134,7 @@ def test_a_fired_trace_says_what_a_degree_costs(kind: str) -> None:
     late = analyze(said_of(engine, drawn.angle - 2.0, drawn.bar), engine.cylinder()).attrs["open"]
     assert late.startswith("a fired trace hardly shows an error of TDC, and 1 °CA moves")
     parts = iter([trace.isel(cycle=slice(0, 1)), trace.isel(cycle=slice(1, 3))])
-    assert analyze(parts, engine.cylinder(), traces=False).attrs["open"] == whole.attrs["open"]
+    assert analyze(parts, engine.cylinder(), keep_traces=False).attrs["open"] == whole.attrs["open"]
     found = estimate_tdc(
         [said_of(engine, drawn.angle, drawn.bar.mean(axis=0, keepdims=True))], engine.cylinder(), span_cad=0.5
     )

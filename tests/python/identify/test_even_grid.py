@@ -16,7 +16,6 @@ from scipy.signal import lfilter
 
 from mgdd import identify
 from mgdd.errors import DataError, ShapeError
-from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.throttle.validation import n_step_rms
@@ -84,7 +83,6 @@ USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "pseudo-Wiener run": lambda time: MODEL.simulate(log(time)),
     "pseudo-Wiener prediction": lambda time: MODEL.predict(log(time), 5),
     "first-principle run": lambda time: FirstPrincipleModel().simulate(log(time)),
-    "fit_first_principle": lambda time: fit_first_principle(log(time), options=ONCE),
     "fit_pseudo_wiener": lambda time: fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
     "identify_throttle": lambda time: identify.identify_throttle(log(time), options=FitOptions(n_starts=1)),
     "validate_throttle": lambda time: identify.validate_throttle(MODEL, log(time)),

@@ -16,14 +16,12 @@ from mgdd import datasets, presets
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import fit_cylinder, fit_ode, identify_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.optimize.least_squares import fit_options
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality, Model
 from mgdd.throttle import PseudoWiener
-from mgdd_studies.benchmarks.two_tanks import TwoTanksModel
 
 TIME = np.arange(4000) * 1e-3
 DUTY = 0.12 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + TIME))
@@ -107,21 +105,11 @@ def test_models_share_one_signature(model: Model) -> None:
         model.simulate(inputs, initial_state={"plate": 8.0})
 
 
-def test_other_models_follow() -> None:
-    smooth = SmoothThrottle()
-    assert (
-        smooth.simulate({"time_s": TIME, "duty": DUTY}, initial_state=[0.14, 0.0, 0.0])["angle_deg"].units == "degree"
-    )
-    with pytest.raises(ParameterError, match="mass missing or unknown"):
-        SmoothThrottle(parameters={**smooth.parameters, "mass": 1.0})
-    assert TwoTanksModel.state_names == ("upper_level_v", "lower_level_v")
-
-
 def test_findings_of_the_search_know_their_names() -> None:
     def twins(x):
         return [x[0] + x[1] - 1.0, 2.0 * (x[0] + x[1]), x[2]], [[1, 1, 0], [2, 2, 0], [0, 0, 1]]
 
-    report = least_squares(twins, [0.1, 0.2, 0.5], names=["a", "b", "c"], lower=[-9, -9, 0.1])
+    report = least_squares(twins, [0.1, 0.2, 0.5], names=["a", "b", "c"], bounds=([-9, -9, 0.1], np.inf))
     found = {finding.code: finding for finding in report.findings}
     assert set(found["null_direction"].names) == {"a", "b"}
     assert found["at_bound"].names == ("c",)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mgdd import _core
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.identify import OdeModel, fit_ode
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions
 
 
@@ -107,42 +105,6 @@ def test_ctrl_c_leaves_the_best_of_the_finished_starts():
         fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings, options=FitOptions(n_starts=3))
     np.testing.assert_array_equal(stop.value.partial.report.values, alone.report.values)
     assert len(stop.value.partial.start_reports) == 1
-
-
-def test_python_and_the_core_agree_on_one_problem():
-    truth = np.array(_core.identify.smooth_example)
-    rng = np.random.default_rng(4)
-    duty = np.repeat(rng.uniform(-0.35, 0.35, 13), 80)[:1000]
-    log = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(duty.size), "duty": duty})
-    log["angle_deg"] = log["angle_deg"] + rng.normal(0.0, 0.05, duty.size)
-
-    def throttle(_t, x, u, p):
-        km, kv, tc, ws, ks, tpd, ths, home, ke, r = p
-        deflection = x[0] - home
-        torque = (
-            20 * km * x[2] - kv * x[1] - tc * np.tanh(x[1] / ws) - ks * deflection - tpd * np.tanh(deflection / ths)
-        )
-        return x[1], torque / 2e-3, (12.0 * u[0] - r * x[2] - 20 * ke * x[1]) / 1e-3
-
-    free = ["torque_constant_nm_per_a", "coulomb_nm", "preload_nm", "limp_home_rad"]
-    names = list(_core.identify.smooth_names)
-    found = fit_ode(
-        throttle,
-        log,
-        input_names=["duty"],
-        output_name="angle_deg",
-        parameters=dict(zip(names, truth * np.where(np.isin(names, free), 1.1, 1.0), strict=True)),
-        initial_state=[0.14, 0.0, 0.0],
-        output=lambda x, _u, _p: np.degrees(x[0]),
-        free=free,
-        options=FitOptions(tolerance=1e-12),
-    )
-    values = np.array([found.model.parameters[name] for name in names])
-    run = SmoothThrottle(parameters=found.model.parameters).simulate(log)["angle_deg"]
-    assert float(((run - log["angle_deg"]) ** 2).sum()) == pytest.approx(2 * found.report.cost, rel=1e-9)
-    # The core's ten-parameter fit cannot be worse than four parameters at the same place.
-    core = SmoothThrottle().fit(log, start_values=values, lower=0.1 * truth, upper=10 * truth)
-    assert core.report.cost <= found.report.cost
 
 
 def test_wrong_calls_name_the_remedy_and_a_right_one_follows():

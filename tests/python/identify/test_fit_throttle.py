@@ -1,4 +1,4 @@
-"""First-principle fit of a throttle log, and the fast ten-parameter fit."""
+"""First-principle fit of a throttle log."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.throttle.first_principle import fit_first_principle
-from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
+from mgdd.errors import DataError, ParameterError
+from mgdd.identify.throttle.automatic import fit_groups
+from mgdd.identify.throttle.first_principle_model import REFINEMENTS, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import regression_start
 from mgdd.identify.throttle.nuisances import TYPICAL_SHARE, delay_weights
-from mgdd.identify.throttle.smooth import SmoothThrottle
+from mgdd.identify.throttle.whole_delay import FINE
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import Model
@@ -32,11 +31,16 @@ TRUTH = {
 }
 
 
+def fit_plain(log, **how):
+    """Fit without a delay, from one start."""
+    return fit_groups(log, **how, delays=[0.0], options=FitOptions(n_starts=1, max_iterations=12))
+
+
 def simulate(time, duty, start_deg):
     inputs = {"time_s": time, "duty": duty}
-    return FirstPrincipleModel(parameters=TRUTH, substeps=4).simulate(inputs, initial_state={"angle_deg": start_deg})[
-        "angle_deg"
-    ]
+    return FirstPrincipleModel(parameters=TRUTH, substeps=FINE).simulate(
+        inputs, initial_state={"angle_deg": start_deg}
+    )["angle_deg"]
 
 
 def make_log(span_s=8.0, offset=0.15, amplitude=0.2, start_deg=40.0, noise_deg=0.0, seed=1, f_end=6.0):
@@ -56,7 +60,7 @@ def two_sided_log(noise_deg=0.03):
 
 
 def test_noise_free_log_gives_the_visited_side_back():
-    fit = fit_first_principle(make_log(), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1, tolerance=1e-14))
+    fit = fit_plain(make_log(), fixed={"limp_home_deg": 8.0})
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "kappa_above_duty_per_deg", "delta_duty"):
         assert fit.parameters[name] == pytest.approx(TRUTH[name], rel=1e-5), name
     assert fit.train.nrmse_fit_percent > 99.99
@@ -78,7 +82,7 @@ def test_the_start_leaves_out_windows_that_hold_a_reversal_or_a_rest(amplitude):
 
 
 def test_a_one_sided_log_names_the_other_side_and_an_excitation():
-    fit = fit_first_principle(make_log(noise_deg=0.03), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1))
+    fit = fit_plain(make_log(noise_deg=0.03), fixed={"limp_home_deg": 8.0})
     assert {"beta_below_duty", "kappa_below_duty_per_deg"} <= set(fit.unidentifiable)
     kept = next(finding for finding in fit.findings if finding.code == "start_value_kept")
     assert set(kept.names) == {"beta_below_duty", "kappa_below_duty_per_deg"}
@@ -87,7 +91,7 @@ def test_a_one_sided_log_names_the_other_side_and_an_excitation():
 
 
 def test_a_two_sided_log_with_noise_gives_both_sides():
-    fit = fit_first_principle(two_sided_log(), options=FitOptions(n_starts=2))
+    fit = fit_plain(two_sided_log())
     assert isinstance(fit.model, Model)
     assert fit.kind == "first_principle"
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty", "beta_below_duty"):
@@ -119,47 +123,23 @@ def test_physical_numbers_come_back_from_either_known_number():
 def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     log = make_log(span_s=1.0)
     with pytest.raises(ParameterError, match="no throttle group"):
-        fit_first_principle(log, fixed={"tau": 0.02})
+        fit_plain(log, fixed={"tau": 0.02})
     with pytest.raises(ParameterError, match="tau_s"):
-        fit_first_principle(log, start_values={"tau_s": 9.0})
+        fit_plain(log, fixed={"tau_s": 9.0})
     with pytest.raises(DataError, match="at least 100"):
-        fit_first_principle(log.isel(time_s=slice(0, 50)))
+        fit_plain(log.isel(time_s=slice(0, 50)))
     with pytest.raises(DataError, match="drive the plate"):
-        fit_first_principle(log.assign(angle_deg=log.angle_deg * 0.0 + 40.0))
+        fit_plain(log.assign(angle_deg=log.angle_deg * 0.0 + 40.0))
     with pytest.raises(ParameterError, match="horizon"):
         FirstPrincipleModel(parameters=TRUTH, substeps=4).predict(log, 0)
-    assert (
-        fit_first_principle(log, fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1)).train.nrmse_fit_percent
-        > 99.0
-    )
+    assert fit_plain(log, fixed={"limp_home_deg": 8.0}).train.nrmse_fit_percent > 99.0
 
 
 def test_prediction_is_corrected_by_the_measurement():
     log = make_log(span_s=2.0)
-    model = FirstPrincipleModel(parameters=TRUTH, substeps=4)
+    model = FirstPrincipleModel(parameters=TRUTH, substeps=FINE)
     ahead = model.predict(log, 20)["angle_deg"]
     np.testing.assert_allclose(ahead, log.angle_deg.values[20:], atol=1e-9)
-
-
-def test_ten_parameters_from_python_reach_the_noise_floor():
-    truth = np.array(_core.identify.smooth_example)
-    rng = np.random.default_rng(7)
-    time = 1e-3 * np.arange(8000)
-    log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(rng.uniform(-0.35, 0.35, 100), 80)})
-    noise = rng.normal(0.0, 0.05, time.size)
-    log["angle_deg"] = log["angle_deg"] + noise
-    starts = truth * rng.uniform(0.7, 1.3, (4, 10))
-    box = {"lower": 0.1 * truth, "upper": 10 * truth}
-    fit = SmoothThrottle().fit(log, start_values=starts, **box)
-    assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
-    assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
-    assert "viscous_nms_per_rad" in fit.unidentifiable
-    with pytest.raises(ShapeError, match="start_values has shape"):
-        SmoothThrottle().fit(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
-    with pytest.raises(ParameterError, match="start torque_constant"):
-        SmoothThrottle().fit(log, start_values=100 * truth, **box)
-    with pytest.raises(ParameterError, match="seed has no effect"):
-        SmoothThrottle().fit(log, start_values=truth, options=FitOptions(seed=1), **box)
 
 
 GROUPS = TRUTH | {"electrical_s": 1e-3}
@@ -176,9 +156,8 @@ def log_of(seed: int = 3, levels: tuple[float, float] = (-0.33, 0.36), **more: f
     return throttle_log(time, duty, angle + 0.03 * rng.standard_normal(time.size))
 
 
-def fit_of(log: Any, free: tuple[str, ...] = ("electrical_s",), **how: Any) -> Any:
-    start = {**GROUPS, "tau_s": 0.022}
-    return fit_first_principle(log, start_values=start, free=free, options=FitOptions(n_starts=1), **how)
+REFINED = ("stribeck_drop", "stribeck_deg_per_s", "presliding_deg", "presliding_damping", "half_gap_deg")
+PLAIN = {name: REFINEMENTS[name] for name in (*REFINED, "ramp_deg")}
 
 
 def codes(fit: Any) -> set[str]:
@@ -188,12 +167,12 @@ def codes(fit: Any) -> set[str]:
 @pytest.mark.parametrize("share", [0.02, 0.48])
 def test_the_interval_holds_whatever_share_of_the_damping_is_not_back_emf(share: float) -> None:
     log = log_of(viscous_share=share)
-    fit = fit_of(log)
+    fit = fit_plain(log, fixed=PLAIN)
     assert fit.parameters["viscous_share"] == TYPICAL_SHARE
     intervals = fit.report.interval()
     for name in MOVING:
         assert intervals[name][0] <= GROUPS[name] <= intervals[name][1], name
-    known = fit_of(log, fixed={"viscous_share": share})
+    known = fit_plain(log, fixed=PLAIN | {"viscous_share": share})
     assert known.report.stderr[0] < 0.75 * fit.report.stderr[0]  # what is known is not considered
     assert fit.stderr["tau_s"] < 0.02 * GROUPS["tau_s"]
     assert "below_ceiling" not in codes(fit)
@@ -202,8 +181,8 @@ def test_the_interval_holds_whatever_share_of_the_damping_is_not_back_emf(share:
 def test_what_the_model_lacks_widens_the_interval_and_what_it_has_does_not() -> None:
     """Friction that drops counts blocks of a second in a fit without the drop, which it takes for something else."""
     log = log_of(viscous_share=TYPICAL_SHARE, stribeck_drop=0.5, stribeck_deg_per_s=25.0)
-    lacks = fit_of(log)
-    has = fit_of(log, free=("electrical_s", "stribeck_drop", "stribeck_deg_per_s"))
+    lacks = fit_plain(log, fixed=PLAIN)
+    has = fit_plain(log, fixed={"ramp_deg": PLAIN["ramp_deg"]})
     assert lacks.report.rmse > 1.5 * has.report.rmse
     assert lacks.report.residual_blocks == pytest.approx(6.0)
     assert has.report.residual_blocks > 20.0
@@ -216,7 +195,7 @@ def test_what_the_model_lacks_widens_the_interval_and_what_it_has_does_not() -> 
 
 def test_a_fit_says_itself_that_it_stays_far_below_the_noise() -> None:
     harsh = log_of(half_gap_deg=2.0, stribeck_drop=1.0, stribeck_deg_per_s=40.0)
-    poor = fit_of(harsh)
+    poor = fit_plain(harsh, fixed=PLAIN)
     assert poor.train.nrmse_fit_percent < 96.0
     assert "below_ceiling" in codes(poor)
 

@@ -101,6 +101,11 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
         PseudoWiener("wiener")
     with pytest.raises(ParameterError, match=r"delay_samples = 5\.5: must be in \[0, 5\]"):
         PseudoWiener("pw_r", {"delay_samples": 5.5})
+    for kind in ("pw_r", "pw_w", "pw_p"):
+        for name in PseudoWiener(kind).parameters:
+            with pytest.raises(ParameterError) as caught:
+                PseudoWiener(kind, {name: np.nan})
+            assert caught.value.field == name
     model = MODELS[0]
     with pytest.raises(DataError, match="uneven sampling"):
         simulate(model, 8.0, time=TIME**2)

@@ -114,13 +114,6 @@ def test_decimals_and_empty_truths_of_parquet_are_numbers(tmp_path: Path) -> Non
     np.testing.assert_array_equal(table.matrix([0, 1]), [[1.25, np.nan], [np.nan, 1.0]])
 
 
-def test_a_struct_of_matlab_has_fields(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(tmp_path / "s.mat", {"bench": {"angle": ANGLE, "p": CYCLES[0], "note": "warm"}})
-    assert set(read_any_table(tmp_path / "s.mat").header or ()) == {"bench.angle", "bench.p"}
-
-
 @pytest.mark.parametrize("above", [[], [["Operator", "Öz"]], [["Operator", "Öz"], ["Run", 17]]])
 def test_a_sheet_may_be_indented_below_remarks(above: list[list[Any]], tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")

@@ -82,8 +82,8 @@ def test_other_edges_and_marks_give_the_same_figures(bench, engine, tmp_path: Pa
     drawn, _, _ = engine
     cylinder, speed = drawn.cylinder(), trace.attrs["speed_rpm"]
     angle = trace["crank_angle_cad"].to_numpy()
-    found = Indicating(angle, cylinder, speed_rpm=speed).record(trace["pressure_bar"])
-    wanted = Indicating(angle, cylinder, speed_rpm=speed).record(true_cycles(bench, trace))
+    found = Indicating(cylinder, angle, speed_rpm=speed).record(trace["pressure_bar"])
+    wanted = Indicating(cylinder, angle, speed_rpm=speed).record(true_cycles(bench, trace))
     for name, most in (("imep_net_bar", 0.05), ("ca50_cad", 0.05), ("p_max_bar", 0.1)):
         assert np.abs(found[name] - wanted[name]).max() < most, name
 

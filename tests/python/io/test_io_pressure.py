@@ -126,16 +126,6 @@ def test_0_720_puts_firing_tdc_at_zero(tdc):
     np.testing.assert_allclose(reordered, 2.0 + 100.0 * np.cos(np.deg2rad(cad) / 4.0) ** 2, atol=1e-9)
 
 
-def test_reading_a_0_720_record(file):
-    order = np.argsort(ANGLES % 720.0)
-    path = file(text((ANGLES % 720.0)[order], BAR[order]))
-    trace = read_pressure(path, firing_tdc_deg=0.0)
-    np.testing.assert_array_equal(trace[ANGLE], ANGLES)
-    np.testing.assert_array_equal(trace["pressure_bar"], BAR)
-    late = read_pressure(file(text(ANGLES + 360.0)), firing_tdc_deg=360.0)
-    assert late.equals(trace)
-
-
 def test_btdc_converts(file):
     trace = pressure_trace(-ANGLES, BAR, before_tdc=True)
     np.testing.assert_array_equal(trace[ANGLE], ANGLES)

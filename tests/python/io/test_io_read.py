@@ -16,7 +16,7 @@ from mgdd.io import read, read_pressure
 from mgdd.io.wrong_channel import no_angle, no_pressure
 from mgdd.results.labels import ANGLE, check_labels
 from pressure_files import CLOSED, CYCLES, FULL, ONE, RUN, Write
-from table_files import WITHOUT_UNITS, WRITERS
+from table_files import WRITERS
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 Array = NDArray[np.float64]
@@ -96,26 +96,6 @@ def test_it_agrees_with_the_reader_of_one_cylinder(write: Write, columns: dict[s
     assert bench[["pressure_bar"]].equals(alone)
     assert bench.attrs == alone.attrs
     assert bench["lift"].dims[-1:] == (ANGLE,)
-
-
-@pytest.mark.parametrize("form", WRITERS)
-def test_the_same_trace_in_every_format(form: str, write: Write, tmp_path: Path) -> None:
-    expected = read(whole(write, "last_night"), firing_tdc_deg=360.0)
-    WRITERS[form](tmp_path / "last_night", WHOLE, UNITS)
-    named = {"pressure_unit": "kPa"} if form in WITHOUT_UNITS else {}
-    bench = read(tmp_path / "last_night", firing_tdc_deg=360.0, **named)
-    bench = bench.drop_vars("time", errors="ignore")  # of MDF
-    if form == "xlsx":
-        assert bench.attrs["file"] == "last_night"
-    assert set(bench.variables) == set(expected.variables)
-    for name in expected.variables:
-        np.testing.assert_allclose(bench[name], expected[name], rtol=1e-14)
-        if form not in WITHOUT_UNITS:
-            assert bench[name].attrs["units"] == expected[name].attrs["units"]
-    if form in WITHOUT_UNITS:
-        said = "the file gives no unit of 'p_intake', 'torque': their numbers are unchanged"
-        assert said in bench.attrs["warnings"] or "'torque', 'p_intake'" in bench.attrs["warnings"]
-        assert bench["torque"].attrs["units"] == "1"
 
 
 # --- rasters and cycles ------------------------------------------------------------------------------------

@@ -135,17 +135,6 @@ def test_a_missing_column_names_those_there(file: Path) -> None:
         read_throttle_log(file, angle="theta")
 
 
-@pytest.mark.parametrize("version", ["5", "4"])
-def test_matlab_vectors(tmp_path: Path, version: str) -> None:
-    from scipy.io import savemat
-
-    savemat(tmp_path / "a.mat", {"t": TIME[:, None], "u": DUTY[:, None], "th": ANGLE[:, None]}, format=version)
-    made = read_throttle_log(tmp_path / "a.mat", time="t", duty="u", angle="th")
-    np.testing.assert_array_equal(made["angle_deg"], ANGLE)
-    with pytest.raises(DataError, match=r"no column 'theta': the header has 't', 'u', 'th'"):
-        read_throttle_log(tmp_path / "a.mat", time="t", duty="u", angle="theta")
-
-
 def test_matlab_structs_matrices_and_compression(tmp_path: Path) -> None:
     from scipy.io import savemat
 

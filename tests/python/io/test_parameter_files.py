@@ -15,15 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mgdd import _core, presets
-from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import OdeModel, load_throttle_model
 from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.loop import SurrogatePlant
-from mgdd.presets.preset import Preset
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
@@ -83,19 +79,7 @@ def pseudo_wiener(draw: st.DrawFn) -> PseudoWiener:
     return PseudoWiener(kind, values | changed(draw, base, moved), **options)
 
 
-@st.composite
-def smooth(draw: st.DrawFn) -> SmoothThrottle:
-    example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
-    return SmoothThrottle(
-        parameters=example | changed(draw, example, list(example)),
-        inertia_kgm2=draw(span(1e-3, 5e-3)),
-        gear_ratio=draw(span(10.0, 30.0)),
-        inductance_h=draw(span(5e-4, 3e-3)),
-        supply_v=draw(span(9.0, 15.0)),
-    )
-
-
-MODELS = st.one_of(first_principle(), pseudo_wiener(), smooth())
+MODELS = st.one_of(first_principle(), pseudo_wiener())
 
 
 @given(model=MODELS, start_deg=span(5.0, 35.0))
@@ -105,7 +89,7 @@ def test_a_throttle_model_simulates_bit_for_bit_after_a_file(model: Any, start_d
     assert again == model
     assert again.to_toml() == model.to_toml()
     step = TIME * (model.parameters.get("sample_s", 1e-3) / 1e-3)
-    state = [math.radians(start_deg), 0.0, 0.0] if model.kind == "smooth" else {"angle_deg": start_deg}
+    state = {"angle_deg": start_deg}
     one, two = (m.simulate({"time_s": step, "duty": DUTY}, initial_state=state) for m in (again, model))
     xr.testing.assert_identical(one, two)
 
@@ -168,42 +152,6 @@ def test_a_file_of_a_model_is_loaded_whatever_its_kind(tmp_path: Path) -> None:
         file = tmp_path / f"{model.kind}.toml"
         file.write_text(model.to_toml(), encoding="utf-8")
         assert load_throttle_model(file) == model
-
-
-@given(
-    values=st.fixed_dictionaries(
-        {
-            name: st.sampled_from(info["choices"]) if "choices" in info else span(0.95, 1.05)
-            for name, info in Throttle.fields().items()
-        }
-    )
-)
-@settings(max_examples=60)
-def test_a_throttle_preset_simulates_bit_for_bit_after_a_file(values: dict[str, Any]) -> None:
-    fields = Throttle.fields()
-    plain = {
-        name: value if "choices" in fields[name] else value * fields[name]["default"] for name, value in values.items()
-    }
-    plain["stiction_nm"] = 1.2 * plain["coulomb_nm"]
-    preset = Preset(
-        name="mine", title="a 'title' \"°CA\"", throttle=Throttle(**plain), sources={"throttle.bore_mm": "x"}
-    )
-    again = Preset.from_toml(preset.to_toml())
-    assert again.records == preset.records
-    runs = [simulate_throttle(one.throttle, 0.3, duration_s=0.1)["angle_deg"].to_numpy() for one in (preset, again)]
-    np.testing.assert_array_equal(*runs)
-
-
-def test_an_engine_preset_simulates_bit_for_bit_after_a_file() -> None:
-    cylinder = Cylinder(
-        burn_shape="double_wiebe", gamma_model="polynomial", wall_heat_model="hohenberg", bore_mm=85.123456789
-    )
-    point = OperatingPoint(trapped_mass_g=0.71234567890123, burn_duration_cad=33.3)
-    preset = Preset(name="mine", title="mine", cylinder=cylinder, point=point)
-    again = Preset.from_toml(preset.to_toml())
-    assert again.records == preset.records
-    one, two = (simulate_cycle(p.cylinder, p.point, soc_cad=-4.0)["pressure_bar"] for p in (preset, again))
-    np.testing.assert_array_equal(one, two)
 
 
 def test_a_sensor_pair_comes_back() -> None:

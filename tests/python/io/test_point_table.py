@@ -80,7 +80,7 @@ def test_a_grid_is_a_list_of_its_cells(tmp_path: Path) -> None:
 
 def test_a_list_keeps_its_numbers_and_inputs(tmp_path: Path) -> None:
     plan = {"speed_rpm": [1000.0, 2500.0], "soc_cad": [-9.0, 1.0]}
-    made = sweep(Cylinder(), OperatingPoint(), plan, points=True, outputs=["p_max_bar"])
+    made = sweep(Cylinder(), OperatingPoint(), plan, pointwise=True, outputs=["p_max_bar"])
     write_netcdf(made.assign_coords(point=("point", [5, 3], made["point"].attrs)), tmp_path / "t.nc")
     table = read_points(tmp_path / "t.nc")
     assert table["point"].values.tolist() == [5, 3]

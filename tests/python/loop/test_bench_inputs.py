@@ -151,7 +151,7 @@ def test_whole_loops_are_those_of_one_at_a_time() -> None:
     assert bench.cycle == 0
 
 
-ALONE = ExtremumSeeking(start=-6.0, lower=-25.0, upper=10.0)
+ALONE = ExtremumSeeking(start=-6.0, bounds=(-25.0, 10.0))
 
 
 @pytest.mark.parametrize(

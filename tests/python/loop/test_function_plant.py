@@ -55,7 +55,7 @@ int slow(const double *in, size_t n, double *out, size_t m, void *data) {
   return 0;
 }
 """
-SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -12.0, "bounds": (-30.0, 10.0)}
 CAPS = [optimize.Limit("p_max_bar", 95.0)]
 
 
@@ -114,7 +114,7 @@ def test_several_inputs_and_limits_too(library: ctypes.CDLL, named: bool) -> Non
     if named:
         given = {"inputs": {"x": (-30.0, 20.0), "egr": (0.0, 0.4)}, "start": {"x": -9.0, "egr": 0.05}}
     else:
-        given = {"start": [-9.0, 0.05], "lower": [-30.0, 0.0], "upper": [20.0, 0.4]}
+        given = {"start": [-9.0, 0.05], "bounds": ([-30.0, 0.0], [20.0, 0.4])}
     runs = [
         run_seeker(make(names, ("p_max_bar",)), optimize.GaussianProcessSeeking(**given, limits=CAPS, seed=1), 60)
         for make in (lambda *a: of(library, "plant", *a), in_python)
@@ -141,7 +141,7 @@ def test_what_the_core_cannot_match_runs_from_python(library: ctypes.CDLL) -> No
 
 
 def test_a_failed_cycle_is_a_misfire(library: ctypes.CDLL) -> None:
-    late = {"start": 6.0, "lower": -30.0, "upper": 30.0}
+    late = {"start": 6.0, "bounds": (-30.0, 30.0)}
     runs = [run_seeker(p, optimize.ExtremumSeeking(**late, amplitude=4.0), 200) for p in (of(library), in_python())]
     xr.testing.assert_identical(runs[0].dataset, runs[1].dataset)
     assert runs[0].summary["misfires"] > 0
@@ -149,7 +149,7 @@ def test_a_failed_cycle_is_a_misfire(library: ctypes.CDLL) -> None:
         run = run_seeker(of(library, name), SEEKERS["Spsa first_order"](), 9)
         assert run.summary["misfires"] == 9
         assert math.isnan(run.dataset["j"][0])
-    half = run_seeker(of(library, "not_a_number"), optimize.ExtremumSeeking(start=-5.0, lower=-9.0, upper=0.0), 50)
+    half = run_seeker(of(library, "not_a_number"), optimize.ExtremumSeeking(start=-5.0, bounds=(-9.0, 0.0)), 50)
     assert 0 < half.summary["misfires"] < 50
 
 
@@ -160,7 +160,7 @@ def test_seek_takes_one(library: ctypes.CDLL) -> None:
     assert found.inputs == twin.inputs
     assert found.inputs["soc_cad"] == pytest.approx(-4.0, abs=0.5)
     front = seek_front(
-        FunctionPlant.C_TYPE(("two", library)), {"x": (-1.0, 4.0)}, {"a": "min", "b": "min"}, cycles=30, points=5
+        FunctionPlant.C_TYPE(("two", library)), {"x": (-1.0, 4.0)}, {"a": "min", "b": "min"}, cycles=30, n_points=5
     )
     ends = front.dataset["inputs"].sel(input="x").to_numpy()[[0, -1]]
     assert ends == pytest.approx([0.0, 3.0], abs=0.3)

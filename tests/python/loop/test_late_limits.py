@@ -25,7 +25,7 @@ from mgdd.optimize import (
 from mgdd.results.labels import check_labels
 
 DELAY, UPPER = 10, 95.0
-SPACE: dict[str, Any] = {"lower": -30.0, "upper": 10.0}
+SPACE: dict[str, Any] = {"bounds": (-30.0, 10.0)}
 
 
 class LatePressure:
@@ -106,7 +106,7 @@ def test_what_cannot_be_is_named(wrong: dict[str, Any], text: str) -> None:
 
 def test_history_and_states_tell_of_the_limits() -> None:
     both = [Limit("low", -1.0, scale=1.0), Limit("high", -5.0, scale=3.0), Limit("far", 90.0)]
-    seeker = ExtremumSeeking(start=-8.0, lower=-20.0, upper=20.0, limits=both)
+    seeker = ExtremumSeeking(start=-8.0, bounds=(-20.0, 20.0), limits=both)
     assert seeker.limit_states == {"low": "free", "high": "free", "far": "free"}
     history = seeker.run(lambda x: (-0.0255 * (x[0] - 8.0) ** 2, [x[0], -x[0], x[0]]), 1500)
     check_labels(history)

@@ -27,7 +27,7 @@ from mgdd.rig import SimulatedRig
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 
-SPACE = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -20.0, "bounds": (-30.0, 10.0)}
 SEEDS = range(20)
 
 
@@ -164,7 +164,7 @@ def test_the_surrogate_knows_its_surfaces_and_the_throttle_has_no_limits() -> No
     assert run.summary["noise_free_worst_mprr"] != run.summary["worst_mprr"]
     first = float(run.dataset["noise_free_limits"][0, 0])
     assert first == float(plain.dataset["limits"][0, 0])  # the same first timing
-    throttle = ExtremumSeeking(start=0.1, lower=-0.5, upper=0.5, amplitude=0.05)
+    throttle = ExtremumSeeking(start=0.1, bounds=(-0.5, 0.5), amplitude=0.05)
     summary = run_seeker(VirtualThrottle(), throttle, 5).summary
     assert not [name for name in summary if "above" in name or "worst" in name]
 

@@ -25,7 +25,7 @@ from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, Spsa
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 
-SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -14.0, "bounds": (-30.0, 10.0)}
 
 
 def bench(**more: Any) -> VirtualEngine:

@@ -100,7 +100,7 @@ def test_the_front_of_two_quadratics_is_found(seed: int) -> None:
 def test_a_front_of_the_bench_is_that_of_its_steady_map() -> None:
     bench = VirtualEngine(seed=3)
     ways = {"efficiency_gross": "max", "nox_soft_ppm": "min"}
-    front = seek_front(bench, {"soc_cad": (-25.0, 5.0)}, ways, start=-18.0, cycles=100, weights=4, points=9)
+    front = seek_front(bench, {"soc_cad": (-25.0, 5.0)}, ways, start=-18.0, cycles=100, n_weights=4, n_points=9)
     assert bench.cycle == 100
     at = np.linspace(-25.0, 5.0, 601)
     steady = bench.steady_map(at)
@@ -241,8 +241,8 @@ class Rig:
         (WAYS, {"cycles": 11}, "cycles = 11: must be a whole number >= 12"),
         (WAYS, {"cycles": 16, "delay_cycles": 5}, "cycles = 16: must be a whole number >= 17"),
         (WAYS, {"delay_cycles": 1.5}, "delay_cycles = 1.5: must be a whole number"),
-        (WAYS, {"weights": 2}, "weights = 2: must be a whole number >= 3 and <= 20"),
-        (WAYS, {"points": 1}, "points = 1: must be"),
+        (WAYS, {"n_weights": 2}, "n_weights = 2: must be a whole number >= 3 and <= 20"),
+        (WAYS, {"n_points": 1}, "n_points = 1: must be"),
         (WAYS, {"start": {"soc_cad": 30.0, "egr": 0.1}}, "soc_cad = 30: must be in"),
         (WAYS, {"limits": {"p_max": 90.0}}, "'p_max' is not measured by the plant"),
     ],

@@ -5,15 +5,17 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mgdd.engine import Cylinder, Performance
 from mgdd.errors import DataError, Error, Interrupted, ParameterError, ShapeError
 from mgdd.guide import Curve, TimingMap
-from mgdd.loop import Measurement, VirtualEngine, run_seeker, seek
+from mgdd.loop import EngineGuide, Measurement, VirtualEngine, run_seeker, seek
 from mgdd.loop.seek_result import SeekResult
 from mgdd.maps import CalibrationMap
 from mgdd.optimize import GaussianProcessSeeking, Input
@@ -140,6 +142,33 @@ def test_a_limit_that_bends_is_read_before_it_is_reached() -> None:
         bench = VirtualEngine(seed=seed, limits=["p_max_bar"])
         found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": 95.0}, cycles=40, seed=seed)
         assert 90.0 < float(found.dataset["noise_free_limits"].max()) < 96.0
+
+
+def test_limits_of_the_engine_alone_are_measured_and_not_kept() -> None:
+    """Values given to the engine do not limit a search, and those of the search count where both have some."""
+    early, capped = {"soc_cad": (-30.0, 10.0)}, {"p_max_bar": 95.0}
+    alone = seek(VirtualEngine(seed=1, limits=capped), early, cycles=40)
+    assert "limit_not_kept" in codes(alone)
+    both = seek(VirtualEngine(seed=1, limits={"p_max_bar": 300.0}), early, limits=capped, cycles=40)
+    assert "limit_not_kept" not in codes(both)
+    assert both.limits["p_max_bar"] < 96.0 < float(alone.dataset["limits"][-1, 0])
+
+
+def test_a_guide_that_is_the_model_of_the_plant_is_a_finding() -> None:
+    for wall_heat, own in ((0.5, True), (1.0, False)):
+        guide = EngineGuide(cylinder=Cylinder(wall_heat_scale=wall_heat))
+        assert ("own_model" in codes(seek(VirtualEngine(), ONE, guide=guide, cycles=12))) is own
+
+
+@pytest.mark.parametrize(
+    ("performance", "name"),
+    [(None, "efficiency"), (Performance.efficiency_and_nox(0.004), "efficiency_percent -0.004 nox_ppm")],
+)
+def test_j_has_the_name_and_the_unit_of_the_objective(performance: Performance | None, name: str) -> None:
+    found = seek(VirtualEngine(performance=performance), ONE, cycles=12)
+    assert re.search(rf"\n +{name} [\d.]+ ± [\d.]+ %\n +gain", found.summary())
+    assert found.dataset["gain"].attrs == {"units": "percent", "long_name": f"gain of {name} over the start"}
+    assert [panel.get_ylabel().replace("\n−", " -") for panel in found.plot().figure.axes][1] == f"{name} [%]"
 
 
 def test_a_start_that_nobody_knows_to_be_safe_is_a_finding() -> None:

@@ -167,7 +167,7 @@ def ca50_error(command_cad):
 )
 def test_load_step_is_learned_with_a_rough_model(law, remaining):
     rough = 0.5 * 0.5**CYCLES
-    learner = IterativeLearning(np.full(40, -4.0), impulse_response=rough, lower=-20.0, upper=5.0, rate=15.0, **law)
+    learner = IterativeLearning(np.full(40, -4.0), impulse_response=rough, bounds=(-20.0, 5.0), rate=15.0, **law)
     for _ in range(12):
         learner.tell(ca50_error(learner.ask()))
     norms = learner.history["error_norm"].values
@@ -232,26 +232,21 @@ def test_wrong_then_right():
         ({}, "k_p is missing: give it, or impulse_response"),
         ({"law": "i"}, "law = 'i': must be one of p, d, pd, q_filter, norm_optimal"),
         ({"k_p": 1.0, "k_d": 1.0}, "k_d does nothing for law 'p'"),
-        ({"k_p": 1.0, "change_weight": 1.0}, "change_weight does nothing for law 'p'"),
-        ({"k_p": 1.0, "error_weight": 1.0}, "error_weight does nothing"),
         ({"k_p": 1.0, "lead": 1}, "lead does nothing"),
         ({"k_p": 1.0, "learning_function": [1.0]}, "learning_function does nothing"),
-        ({"k_p": 1.0, "law": "d"}, "k_p does nothing for law 'd'"),
         ({"k_p": 1.0, "law": "pd"}, "k_d is missing"),
         ({"k_p": np.nan}, "k_p = nan"),
-        ({"k_p": 1.0, "upper": 0.0, "lower": 0.0}, "lower = 0: must be < upper"),
+        ({"k_p": 1.0, "bounds": 3.0}, "bounds = 3: must be a pair"),
+        ({"k_p": 1.0, "bounds": (0.0, 0.0)}, "lower = 0: must be < upper"),
         ({"k_p": 1.0, "relative_degree": 3}, "relative_degree = 3"),
-        ({"k_p": 1.0, "relative_degree": -1}, "relative_degree = -1"),
         ({"k_p": 1.0, "initial": [0.0, np.inf, 0.0]}, r"initial\[1\] = inf"),
         ({"k_p": 1.0, "initial": [0.0, 1.0, 1.0], "rate": 0.5}, r"initial\[1\] = 1: differs .* rate = 0.5"),
         ({"impulse_response": [1.0], "initial": np.zeros(1001)}, "initial has 1001 samples"),
         ({"k_p": 1.0, "cutoff": 1.0}, "cutoff = 1: must be in"),
-        ({"k_p": 1.0, "cutoff": 1.5}, "cutoff = 1.5: must be in"),
-        ({"k_p": 1.0, "lower": 0.5}, r"initial\[0\] = 0: must be in \[0.5, inf\]"),
+        ({"k_p": 1.0, "bounds": (0.5, None)}, r"initial\[0\] = 0: must be in \[0.5, inf\]"),
         ({"k_p": 1.0, "rate": -1.0}, "rate = -1: must be > 0"),
         ({"law": "norm_optimal"}, "impulse_response is missing"),
         ({"law": "norm_optimal", "impulse_response": [1.0], "error_weight": 0.0}, "error_weight = 0: must be > 0"),
-        ({"law": "norm_optimal", "impulse_response": [1.0], "change_weight": -1.0}, "change_weight = -1"),
         ({"law": "norm_optimal", "impulse_response": [1.0], "input_weight": np.nan}, "input_weight = nan"),
         ({"law": "norm_optimal", "impulse_response": [1.0], "cutoff": 0.2}, "cutoff does nothing"),
         ({"impulse_response": [0.0, 1.0], "relative_degree": 0}, "first acts after 1 samples"),
@@ -301,7 +296,7 @@ def test_state_and_pickle_go_on_bit_for_bit(name):
 
 
 def test_bad_states_change_nothing():
-    learner = IterativeLearning([0.0, 0.0], k_p=0.5, upper=9.0)
+    learner = IterativeLearning([0.0, 0.0], k_p=0.5, bounds=(-np.inf, 9.0))
     run(learner, [1.0], np.ones(2), 2)
     good = learner.state
     for change, error, message in (

@@ -66,7 +66,7 @@ def bowl(x: Point) -> float:
 @pytest.mark.parametrize("amplitude", [[1.0, 1.0], [0.5, 2.0], [1.0, 0.5]])
 @pytest.mark.parametrize("name", ["batch", "moving_average", "washout"])
 def test_unequal_amplitudes_end_where_equal_ones_end(name: str, amplitude: list[float]) -> None:
-    space = {"start": [-2.0, -1.0], "lower": -8.0, "upper": 8.0, "limits": [Limit("sum", 2.0, scale=1.0)]}
+    space = {"start": [-2.0, -1.0], "bounds": (-8.0, 8.0), "limits": [Limit("sum", 2.0, scale=1.0)]}
     small = [0.2 * a for a in amplitude]
     end = end_of(dithering(small, space, TWO)[name](), bowl, lambda x: np.array([x.sum()]), 8000)
     # What the dither keeps free of the limit, on the way to (1, 1) by symmetry of J and limit.
@@ -84,8 +84,7 @@ def test_a_bound_and_a_limit_at_once(name: str) -> None:
     amplitude = [0.05, 0.1]
     space = {
         "start": [-2.0, -1.0],
-        "lower": [-8.0, -8.0],
-        "upper": [0.5, 8.0],
+        "bounds": ([-8.0, -8.0], [0.5, 8.0]),
         "limits": [Limit("sum", 2.0, scale=1.0)],
     }
     if name in ("spsa", "spsa_second_order", "gradient"):
@@ -117,7 +116,7 @@ def mixed(x: Point) -> float:
 def test_three_inputs_and_two_limits_end_where_slsqp_ends(name: str) -> None:
     """The limits leave room for the reach of each dither, so the solver is asked with that room."""
     limits = [Limit("a", UPPER[0], scale=1.0), Limit("b", UPPER[1], scale=1.0)]
-    space = {"start": [-2.0, -1.0, -3.0], "lower": -9.0, "upper": 9.0, "limits": limits}
+    space = {"start": [-2.0, -1.0, -3.0], "bounds": (-9.0, 9.0), "limits": limits}
     amplitude = AMPLITUDE
     seeker = {**dithering(amplitude, space, THREE), **direct(space)}[name]()
     end = end_of(seeker, mixed, lambda x: PLANES @ x, 12000)
@@ -134,7 +133,7 @@ def test_three_inputs_and_two_limits_end_where_slsqp_ends(name: str) -> None:
 @pytest.mark.parametrize("name", ["batch", "gradient"])
 def test_j_never_falls_after_the_first_arrival(name: str) -> None:
     limits = [Limit("a", UPPER[0], scale=1.0), Limit("b", UPPER[1], scale=1.0)]
-    space = {"start": [-2.0, -1.0, -3.0], "lower": -9.0, "upper": 9.0, "limits": limits}
+    space = {"start": [-2.0, -1.0, -3.0], "bounds": (-9.0, 9.0), "limits": limits}
     seeker = {**dithering(AMPLITUDE, space, THREE), **direct(space)}[name]()
     history = seeker.run(lambda x: (mixed(x), PLANES @ x), 12000)
     estimate = history["estimate"].to_numpy()

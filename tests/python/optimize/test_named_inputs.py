@@ -138,7 +138,7 @@ def test_inputs_that_the_plant_does_not_have_are_refused() -> None:
         with pytest.raises(ParameterError, match=r"inputs of the seeker are soi_cad: the plant takes"):
             call()
     named = Spsa(start=-8.0, inputs={"soc_cad": (-30.0, 10.0)})
-    plain = Spsa(start=-8.0, lower=-30.0, upper=10.0)
+    plain = Spsa(start=-8.0, bounds=(-30.0, 10.0))
     runs = [run_seeker(VirtualEngine(seed=1), seeker, 60).dataset["asked"][:, 0] for seeker in (named, plain)]
     assert runs[0].equals(runs[1])
 
@@ -149,7 +149,7 @@ def test_inputs_that_the_plant_does_not_have_are_refused() -> None:
         ({"start": {"a": 1.0}}, ParameterError, "start.*names need `inputs`"),
         ({"start": [1.0, 2.0], "inputs": {"a": (0.0, 3.0)}}, ShapeError, "inputs has 1 entries: must have 2"),
         ({"start": {"a": 1.0, "c": 2.0}, "inputs": {"a": (0, 3), "b": (0, 3)}}, ShapeError, "start has a, c.*a, b"),
-        ({"start": 1.0, "inputs": {"a": (0.0, 3.0)}, "lower": 0.5}, ParameterError, "lower = 0.5.*inputs say of a"),
+        ({"start": 1.0, "inputs": {"a": (0.0, 3.0)}, "bounds": (0.5, None)}, ParameterError, "lower = 0.5.*say of a"),
         ({"start": 1.0, "inputs": {"a": (3.0, 0.0)}}, ParameterError, "inputs: a lower = 3: must be < upper = 0"),
         ({"start": 1.0, "inputs": {"a": (0.0, np.nan)}}, ParameterError, "inputs: a lower"),
         ({"start": 1.0, "inputs": {"a": (-1e308, 1e308)}}, ParameterError, "inputs: a upper = 1e[+]308"),

@@ -78,7 +78,7 @@ def test_bounded_problem_equals_scipy_trf(seed):
     lower, upper = truth - rng.uniform(-0.2, 1.0, 3), truth + rng.uniform(0.25, 1.0, 3)
     start = rng.uniform(lower, upper)
     fun = decay(t, y)
-    fit = least_squares(fun, start, lower=lower, upper=upper)
+    fit = least_squares(fun, start, bounds=(lower, upper))
     peer = scipy_optimize.least_squares(
         lambda p: fun(p)[0],
         start,
@@ -97,7 +97,7 @@ def test_bounded_problem_equals_scipy_trf(seed):
 def test_optimum_beyond_a_bound_ends_on_it_and_says_so():
     t = np.linspace(0.0, 4.0, 60)
     y = 2.0 * np.exp(-0.8 * t) + 0.3
-    fit = least_squares(decay(t, y), [1.0, 0.5, 0.0], names=["a", "rate", "offset"], upper=[1.5, 5.0, 1.0])
+    fit = least_squares(decay(t, y), [1.0, 0.5, 0.0], names=["a", "rate", "offset"], bounds=(-np.inf, [1.5, 5.0, 1.0]))
     assert fit.bounds_active.tolist() == [1, 0, 0]
     assert fit.values[0] == 1.5
     assert np.isnan(fit.stderr[0])
@@ -115,7 +115,7 @@ def test_log_scaled_parameters_report_natural_units():
         e = np.exp(-p[1] * t)
         return p[0] * e - y, np.column_stack([e, -p[0] * t * e])
 
-    fit = least_squares(fun, [1.0, 1e-3], lower=[1e-12, 1e-6], log_scaled=[True, True])
+    fit = least_squares(fun, [1.0, 1e-3], bounds=([1e-12, 1e-6], np.inf), log_scaled=[True, True])
     near = least_squares(fun, [2.9e-6, 1.6])
     assert fit.success
     np.testing.assert_allclose(fit.values, near.values, rtol=1e-6)
@@ -215,8 +215,9 @@ def test_a_model_that_changes_its_number_of_residuals_is_refused():
     ("arguments", "error", "message"),
     [
         ({"x0": [np.nan, 1.0]}, ParameterError, "start of x0 = nan"),
-        ({"x0": [-1.2, 9.0], "upper": 5.0}, ParameterError, "start of x1 = 9: must be finite and in"),
-        ({"lower": [1.0, 1.0], "upper": 0.0}, ParameterError, "x0: lower = 1 must be < upper = 0"),
+        ({"x0": [-1.2, 9.0], "bounds": (None, 5.0)}, ParameterError, "start of x1 = 9: must be finite and in"),
+        ({"bounds": "ab"}, ParameterError, "bounds = 'ab': must be a pair"),
+        ({"bounds": ([1.0, 1.0], 0.0)}, ParameterError, "x0: lower = 1 must be < upper = 0"),
         ({"log_scaled": [False, True]}, ParameterError, "x1: lower = -inf must be > 0"),
         ({"names": ["a", "a"]}, ParameterError, "'a' appears twice"),
         ({"max_iterations": 0}, ParameterError, "max_iterations = 0"),
@@ -224,7 +225,7 @@ def test_a_model_that_changes_its_number_of_residuals_is_refused():
         ({"names": ["", "b"]}, ParameterError, "parameter 0 has no name"),
         ({"x0": [[0.0, 1.0]]}, ShapeError, "x0 has 2 dimensions"),
         ({"x0": ["low", "high"]}, ParameterError, "must be numbers"),
-        ({"lower": [0.0, 0.0, 0.0]}, ShapeError, "lower has 3 values for the 2"),
+        ({"bounds": ([0.0, 0.0, 0.0], np.inf)}, ShapeError, "bounds.0. has 3 values for the 2"),
         ({"names": ["a"]}, ShapeError, "must be 2 names"),
         ({"names": "ab"}, ShapeError, "must be 2 names"),
     ],
@@ -250,7 +251,7 @@ def test_arrays_of_the_caller_stay_as_they_were():
         x[:] = 99.0
         return result
 
-    fit = least_squares(spoils_its_argument, x0, lower=lower)
+    fit = least_squares(spoils_its_argument, x0, bounds=(lower, np.inf))
     assert x0.tolist() == [-1.2, 1.0]
     assert lower.tolist() == [-2.0, -2.0]
     np.testing.assert_allclose(fit.values, [1.0, 1.0], rtol=1e-9)
@@ -259,7 +260,7 @@ def test_arrays_of_the_caller_stay_as_they_were():
 def test_reports_are_independent_and_read_only():
     first = least_squares(rosenbrock, [-1.2, 1.0])
     kept = first.values.copy()
-    least_squares(rosenbrock, [5.0, -5.0], upper=0.2 + np.array([5.0, 0.0]))
+    least_squares(rosenbrock, [5.0, -5.0], bounds=(-np.inf, 0.2 + np.array([5.0, 0.0])))
     np.testing.assert_array_equal(first.values, kept)
     with pytest.raises(ValueError, match="read-only"):
         first.values[0] = 0.0
@@ -292,7 +293,7 @@ def test_summary_html_and_json_tell_the_same_story():
         linear(a, a @ [9.0, 0.0, 1.0] + 0.1),
         np.zeros(3),
         names=["<gain>", "idle", "k"],
-        upper=[2.0, 5.0, 5.0],
+        bounds=(-np.inf, [2.0, 5.0, 5.0]),
     )
     text, page, plain = fit.summary(), fit._repr_html_(), fit.to_dict()
     for line in ("at upper bound", "not identifiable", "idle: the residual does not depend on it"):

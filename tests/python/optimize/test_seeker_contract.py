@@ -14,13 +14,13 @@ from mgdd.errors import ParameterError
 from mgdd.optimize import Seeker, Spsa
 
 BEST, START = 4.0, -8.0
-SEEKERS = stepped(start=START, lower=-20.0, upper=20.0)
+SEEKERS = stepped(start=START, bounds=(-20.0, 20.0))
 every = pytest.mark.parametrize("name", SEEKERS)
 # Their own rules for readings, actuators and failing inputs are tested with them.
 OWN_LIKELIHOOD = {"GaussianProcessSeeking", "CurveSeeking"}
 shared = pytest.mark.parametrize("name", sorted(set(SEEKERS) - OWN_LIKELIHOOD))
 
-LIMITED = stepped(start=START, lower=-20.0, upper=20.0, limits={"p_max_bar": 100.0})
+LIMITED = stepped(start=START, bounds=(-20.0, 20.0), limits={"p_max_bar": 100.0})
 Actuator = Callable[[float], float]
 
 

@@ -21,7 +21,7 @@ from mgdd.optimize import (
     tune,
 )
 
-SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -12.0, "bounds": (-30.0, 10.0)}
 
 
 def test_blocking_follows_a_plant_whose_best_value_has_dropped() -> None:
@@ -40,7 +40,7 @@ def test_golden_section_finds_its_width_again() -> None:
 
     bench = VirtualEngine(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
     best = bench.find_optimum()
-    seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
+    seeker = GoldenSection(start=-20.0, bounds=(-30.0, 10.0), noise_sd=0.25)
     table = monte_carlo(bench, seeker, range(200), cycles=2000, criteria=LoopCriteria(optimum=best["soc_cad"]))
     assert np.abs(table["final_soc_cad"].values - best["soc_cad"]).max() < 1.5
 
@@ -48,7 +48,7 @@ def test_golden_section_finds_its_width_again() -> None:
 def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
     """COV of IMEP looks back 50 cycles: its answer to the timing is hidden, and it is feasible at the optimum only."""
     bench = VirtualEngine(limits=["cov_imep_percent"])
-    space = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+    space = {"start": -20.0, "bounds": (-30.0, 10.0)}
     limits = [Limit("cov_imep_percent", 0.6)]
     table = monte_carlo(bench, ExtremumSeeking(**space, limits=limits), range(10), cycles=3000)
     assert np.abs(table["final_soc_cad"].values + 5.63).max() < 3.0
@@ -79,14 +79,12 @@ def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
         ),
         (lambda: VirtualEngine().find_optimum({"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
         (lambda: VirtualEngine().find_optimum({"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
-        (lambda: VirtualEngine().find_optimum({"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
         (lambda: VirtualEngine().find_optimum(cycle=-1), ParameterError, "cycle = -1"),
         (lambda: VirtualEngine().steady_map([-6.0], cycle=-1), ParameterError, "cycle = -1"),
         (lambda: VirtualEngine().steady_map([[1.0, 2.0]]), ShapeError, "2 dimensions"),
         (lambda: LoopCriteria(exceed_above={"p_max_bar": math.nan}), ParameterError, "exceed_above: p_max_bar = nan"),
         (lambda: run_seeker(object(), Spsa(**SPACE), 5), ParameterError, r"must have input_names, limit_names, apply"),  # type: ignore[arg-type]
         (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
-        (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: Spsa(**SPACE, limits=[Limit("a", 1.0), Limit("a", 2.0)]), ParameterError, "limit a: is given twice"),
         (lambda: Limit("", 1.0), ParameterError, "name is empty"),
         (
@@ -106,7 +104,7 @@ MADE: dict[str, Callable[..., Any]] = {
     "VirtualEngine": VirtualEngine,
     "FeedForward": lambda **own: FeedForward(ExtremumSeeking(**SPACE), **own),
     "ModelOptimum": lambda **own: ModelOptimum(Cylinder(), **own),
-    "OnlineCalibration": lambda **own: OnlineCalibration(**{"engine": Cylinder(), "soc_scatter_cad": 0.3, **own}),
+    "OnlineCalibration": lambda **own: OnlineCalibration(**{"cylinder": Cylinder(), "soc_scatter_cad": 0.3, **own}),
 }
 
 

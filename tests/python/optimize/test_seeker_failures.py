@@ -21,7 +21,7 @@ from mgdd.optimize import (
     Spsa,
 )
 
-SPACE: dict[str, Any] = {"start": -5.0, "lower": -20.0, "upper": 20.0}
+SPACE: dict[str, Any] = {"start": -5.0, "bounds": (-20.0, 20.0)}
 # A process knows by itself which inputs fail, and sets no edges.
 MAKERS = {name: make for name, make in stepped(**SPACE).items() if name != "GaussianProcessSeeking"}
 every = pytest.mark.parametrize("name", MAKERS)
@@ -109,7 +109,7 @@ def test_three_failures_in_ten_by_chance_are_said_and_set_no_edge(name: str) -> 
 
 def test_a_process_says_that_cycles_fail() -> None:
     plant = Failing(edge=99.0, share=0.3, seed=1)
-    run = run_seeker(plant, GaussianProcessSeeking(start=-5.0, lower=-20.0, upper=20.0, seed=2), 60)
+    run = run_seeker(plant, GaussianProcessSeeking(start=-5.0, bounds=(-20.0, 20.0), seed=2), 60)
     assert [finding.code for finding in run.findings] == ["failing_cycles"]
     assert "of 60 cycles" in run.findings[0].text
 
@@ -141,7 +141,7 @@ def test_asking_twice_and_a_start_that_fails_are_the_same_input() -> None:
 
 
 def test_two_inputs_of_which_one_fails_or_both_together() -> None:
-    two: dict[str, Any] = {"start": [-5.0, -5.0], "lower": -20.0, "upper": 20.0}
+    two: dict[str, Any] = {"start": [-5.0, -5.0], "bounds": (-20.0, 20.0)}
     makers: list[Callable[[], Any]] = [
         lambda: ExtremumSeeking(**two, period=40, harmonics=[4, 5]),
         lambda: Spsa(**two),

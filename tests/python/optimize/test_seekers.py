@@ -28,7 +28,7 @@ from mgdd.optimize import (
 from mgdd.results.labels import check_labels, label_of
 
 LIMITS = [Limit("p_max_bar", 150.0, margin=1.0), Limit("rise", 4.0, method="penalty", weight=2.0, scale=1.0)]
-BOX = {"lower": -40.0, "upper": 40.0}
+BOX = {"bounds": (-40.0, 40.0)}
 ONE = stepped(start=8.0, **BOX)
 LIMITED = stepped(start=8.0, limits=LIMITS, **BOX) | stepped(start=[8.0, -6.0, 4.0], limits=LIMITS, **BOX)
 MAKERS = ONE | {f"{name}, limited": make for name, make in LIMITED.items()}
@@ -54,7 +54,7 @@ def run(seeker: Any, cycles: int) -> list[list[float]]:
 
 # --- what it accepts ----------------------------------------------------------------------------------------
 def test_tell_takes_numbers_of_every_kind() -> None:
-    seeker = ExtremumSeeking(start=np.float32(2.0), lower=np.array([-9.0]))
+    seeker = ExtremumSeeking(start=np.float32(2.0), bounds=(np.array([-9.0]), np.inf))
     for j in (1.0, 2, np.float32(3.0), np.array(4.0), np.array([5.0]), [6.0], (7.0,)):
         seeker.ask()
         seeker.tell(j)
@@ -122,7 +122,7 @@ def test_what_is_asked_stays_finite_and_within_bounds_whatever_is_told(make: Any
     for size in (1.0, 1e6, 9e29):
         seeker, rng = make(), np.random.default_rng(3)
         reach = np.array(seeker.settings.get("amplitude", [0.0]))
-        lower, upper = (np.array(seeker.settings[side]) for side in ("lower", "upper"))
+        lower, upper = map(np.array, seeker.settings["bounds"])
         for k in range(150):
             x = seeker.ask()
             assert np.all((lower <= x) & (x <= upper))
@@ -160,15 +160,17 @@ def test_each_setting_refuses_by_name_or_bears_its_value(name: str) -> None:
                 assert not np.isnan(value), field
                 run(seeker, 12)
                 assert np.isfinite(seeker.ask()).all(), (field, value)
-            assert field in said or (field in BOX and "bounds" in said), (field, value)
+            assert field in said, (field, value)
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ExtremumSeeking(start=30.0, upper=10.0), r"start = 30: must lie in \[-inf, 9\]"),
-        (lambda: ExtremumSeeking(start=0.0, lower=5.0), "start = 0: must lie in"),
-        (lambda: ExtremumSeeking(start=0.0, lower=-0.5, upper=0.5, amplitude=1.0), "room for the perturbation"),
+        (lambda: ExtremumSeeking(start=30.0, bounds=(None, 10.0)), r"start = 30: must lie in \[-inf, 9\]"),
+        (lambda: ExtremumSeeking(start=0.0, bounds=(5.0, None)), "start = 0: must lie in"),
+        (lambda: ExtremumSeeking(start=0.0, bounds=(-0.5, 0.5), amplitude=1.0), "room for the perturbation"),
+        (lambda: Spsa(start=0.0, bounds=(math.nan, 1.0)), "lower = nan"),
+        (lambda: Spsa(start=[0.0, 0.1], bounds={"a": (0.0, 1.0), "b": (0.0, 1.0)}), "bounds = .*a pair.*inputs="),
         (lambda: ExtremumSeeking(start=0.0, period=3), "period = 3: must be at least 4"),
         (lambda: ExtremumSeeking(start=[0, 0, 0], period=40, harmonics=[3, 4, 7]), "mix to"),
         (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),
@@ -179,7 +181,7 @@ def test_each_setting_refuses_by_name_or_bears_its_value(name: str) -> None:
         (lambda: Spsa(start=0.0, gain=0.0), "gain = 0.*: must be > 0"),
         (lambda: Spsa(start=0.0, gain_exponent=0.55), "gain_exponent = 0.55: must exceed"),
         (lambda: Spsa(start=0.0, form="second_order", initial_hessian=0.0), "initial_hessian = 0: must be < 0"),
-        (lambda: GoldenSection(start=0.0, lower=-np.inf, upper=1.0), "lower = -inf: must be finite"),
+        (lambda: GoldenSection(start=0.0, bounds=(-np.inf, 1.0)), "lower = -inf: must be finite"),
         (lambda: GoldenSection(start=0.0, **BOX, samples_max=0), "samples_max = 0: must be >= 1"),
         (lambda: ComponentLag(delay_cycles=-1.0), "delay_cycles = -1"),
         (lambda: ExtremumSeeking(start=0.0, components=[]), "components is empty"),
@@ -206,7 +208,7 @@ def test_a_gain_left_open_is_made_of_first_readings_and_fits_any_unit_of_j(make:
     """Percent or fraction: the optimum is found, and `settings` leave the gain open again."""
     found = []
     for unit in (1.0, 0.01, 3000.0):
-        seeker, noise = make(start=-12.0, lower=-30.0, upper=10.0), np.random.default_rng(2)
+        seeker, noise = make(start=-12.0, bounds=(-30.0, 10.0)), np.random.default_rng(2)
         for k in range(800):
             assert (getattr(seeker, name) is None) == (k < 24)
             seeker.tell(unit * (40.0 - 0.06 * (seeker.ask()[0] + 5.5) ** 2 + 0.2 * noise.normal()))

@@ -115,7 +115,7 @@ def test_a_peak_off_which_no_parabola_can_be_read_is_refused() -> None:
 
 def test_the_seeker_carries_what_was_tuned() -> None:
     tuning = tune(SIGMA, BEND, delay_cycles=38.0, lag_cycles=25.0)
-    seeker = tuning.seeker(start=-15.0, lower=-30.0, upper=10.0, limits=[Limit("p", 9.0)], hold_cycles=7)
+    seeker = tuning.seeker(start=-15.0, bounds=(-30.0, 10.0), limits=[Limit("p", 9.0)], hold_cycles=7)
     assert isinstance(seeker, ExtremumSeeking)
     settings = seeker.settings
     assert settings["amplitude"] == [tuning.amplitude]

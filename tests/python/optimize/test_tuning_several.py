@@ -241,7 +241,7 @@ def test_the_seeker_carries_what_was_tuned_in_its_own_order(method: str) -> None
         assert settings["harmonics"] == tuning.harmonics[::-1].tolist()
     in_order = tuning.seeker(start=[-9.0, 0.25], inputs={"egr": (0.0, 0.4), "soc_cad": (-25.0, 15.0)})
     assert in_order.estimate.tolist() == seeker.estimate.tolist() == [0.25, -9.0]
-    plain = tuning.seeker(start=start, lower={"egr": 0.0, "soc_cad": -25.0}, upper=[15.0, 0.4])
+    plain = tuning.seeker(start=start, bounds={"egr": (0.0, 0.4), "soc_cad": (-25.0, 15.0)})
     assert plain.settings["inputs"] == [Input("soc_cad", -25.0, 15.0), Input("egr", 0.0, 0.4)]
     assert set(plain.ask()) == {"soc_cad", "egr"}
 
@@ -268,7 +268,7 @@ def test_a_name_of_one_input_stays() -> None:
     assert tuning == tune(NOISE, -0.051, distance=12.0, inputs=["soc_cad"])
     assert tuning != tune(NOISE, -0.051, distance=12.0)
     assert isinstance(tuning.gain, float)
-    assert set(tuning.seeker(start=-9.0, lower=-30.0, upper=10.0).ask()) == {"soc_cad"}
+    assert set(tuning.seeker(start=-9.0, bounds=(-30.0, 10.0)).ask()) == {"soc_cad"}
 
 
 def test_tuning_of_several_inputs_is_a_value() -> None:
@@ -331,7 +331,9 @@ def test_inputs_that_were_not_tuned_are_refused() -> None:
     tuning = tune(NOISE, PAIR)
     with pytest.raises(ParameterError, match="inputs are egr, soi_cad: this was tuned for soc_cad, egr"):
         tuning.seeker(start=[0.0, 0.2], inputs={"egr": (0.0, 0.4), "soi_cad": (-9.0, 9.0)})
-    with pytest.raises(ParameterError, match="lower and upper: inputs hold the bounds"):
-        tuning.seeker(start=[0.0, 0.2], lower=[-9.0, 0.0], inputs={"egr": (0.0, 0.4), "soc_cad": (-9.0, 9.0)})
+    with pytest.raises(ParameterError, match="bounds: inputs hold them"):
+        tuning.seeker(
+            start=[0.0, 0.2], bounds=([-9.0, 0.0], [9.0, 0.4]), inputs={"egr": (0.0, 0.4), "soc_cad": (-9.0, 9.0)}
+        )
     with pytest.raises(ShapeError, match="rms has 2 entries: must be one number"):
         tune(NOISE, -0.06, rms=[1.0, 2.0])

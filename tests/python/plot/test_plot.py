@@ -403,7 +403,7 @@ def test_a_run_without_a_reference_shows_what_is_there() -> None:
 # --- what a run knows ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("guided", [False, True], ids=["loop of the core", "loop in Python"])
 def test_a_run_that_knows_its_optimum_and_limit_shows_them(guided: bool) -> None:
-    seeker = ExtremumSeeking(start=-8.0, lower=-30.0, upper=10.0, limits={"p_max_bar": 104.0})
+    seeker = ExtremumSeeking(start=-8.0, bounds=(-30.0, 10.0), limits={"p_max_bar": 104.0})
     loop = FeedForward(seeker, lambda _: -8.0) if guided else seeker
     bench = VirtualEngine(seed=1, limits=["p_max_bar"], nox_sensor="none")
     run = run_seeker(bench, loop, 60, criteria=LoopCriteria(optimum=-3.25))

@@ -213,7 +213,7 @@ def test_a_seeker_below_a_guard_keeps_the_bounds_and_learns_from_what_was_applie
         rates={"soc_cad": 1.5},
         limits=[Limit("p_max_bar", upper)],
     )
-    run = run_seeker(SimulatedRig(guard), kind(start=2.0, lower=-30.0, upper=10.0), 600)
+    run = run_seeker(SimulatedRig(guard), kind(start=2.0, bounds=(-30.0, 10.0)), 600)
     applied = run.dataset["applied"][:, 0].to_numpy()
     assert applied.min() >= -7.0
     asked = run.dataset["asked"][:, 0].to_numpy()

@@ -64,7 +64,7 @@ def test_tracking_over_the_bus_is_that_of_one_process() -> None:
 @pytest.mark.slow
 def test_seeking_on_the_virtual_engine_over_the_bus() -> None:
     def seeker() -> ExtremumSeeking:
-        return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+        return ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
 
     with CanRig(
         "engine", plant=VirtualEngine(limits=["cov_imep_percent", "p_max_bar", "dp_max_bar_per_cad"], seed=4)

@@ -29,8 +29,7 @@ CYCLES = 700
 NAMES = ["p_max_bar", "dp_max_bar_per_cad", "cov_imep_percent"]
 SPACE: dict[str, Any] = {
     "start": -18.0,
-    "lower": -30.0,
-    "upper": 10.0,
+    "bounds": (-30.0, 10.0),
     "limits": [Limit("p_max_bar", 120.0), Limit("dp_max_bar_per_cad", 9.0, method="penalty"), Limit(NAMES[2], 40.0)],
 }
 LATE = {"components": [ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25.0)], "period": 60}
@@ -80,7 +79,7 @@ def hill(_: int, soc: float) -> Measurement:
 
 
 def seeker() -> ExtremumSeeking:
-    return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=0.98)
+    return ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0), gain=0.98)
 
 
 @pytest.mark.parametrize(("name", "sensor"), [*((name, "analyser") for name in SEEKERS), (BATCH, "soft_corrected")])
@@ -172,10 +171,10 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
         run_seeker(rig, Spsa(start=[0.0, 1.0]), 5)
     assert rig.applied == []
     assert own.state == before
-    limited = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, limits=[Limit("p_max_bar", 95.0)])
+    limited = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0), limits=[Limit("p_max_bar", 95.0)])
     with pytest.raises(ParameterError, match=r"limits of the seeker \['p_max_bar'\] are not all measured by the plant"):
         run_seeker(rig, limited, 5)
-    split = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, components=[ComponentLag()] * 3)
+    split = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0), components=[ComponentLag()] * 3)
     with pytest.raises(ParameterError, match="components has 3 entries: the plant measures 1"):
         run_seeker(rig, split, 5)
     assert limited.cycle == split.cycle == 0
@@ -202,7 +201,7 @@ def test_summary_of_half_a_run() -> None:
 
 def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
     """Bounds wider than the window of the bench: the loop of the core and the one from Python stay one."""
-    wide = {"start": -20.0, "lower": -80.0, "upper": 60.0}
+    wide = {"start": -20.0, "bounds": (-80.0, 60.0)}
     ends = []
     for make in (lambda: ExtremumSeeking(**wide, gain=3.0, maximize=False), lambda: Spsa(**wide, maximize=False)):
         in_core, on_rig = make(), make()

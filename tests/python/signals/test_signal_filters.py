@@ -1,4 +1,4 @@
-"""What SciPy computes here equals the plain definitions: shift registers, polynomials, difference equations."""
+"""Filters of signals, and signals that repeat."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import savgol_filter
 
 from mgdd.signals.excitation import _TAPS, maximum_length_sequence
+from mgdd.signals.repeats import copies, noise_of, still
 from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
 
 
@@ -56,3 +57,43 @@ def test_a_filter_is_its_difference_equation(seed: int) -> None:
     model = LinearApproximation(numerator=b, denominator=a, input_mean=0.0, output_mean=0.0, rmse=0.0)
     record = {"time_s": np.arange(u.size) * 1e-3, "input_v": u}
     np.testing.assert_allclose(model.simulate(record)["output_v"], y, rtol=0.0, atol=1e-12 * np.abs(y).max())
+
+
+RANDOM = np.random.default_rng(1)
+SHAPE = 40.0 / (1.0 + np.linspace(-6.0, 6.0, 720) ** 2)
+SIZE = 720
+
+
+def rows(step: float) -> np.ndarray:
+    drawn = SHAPE + RANDOM.normal(0.0, 0.03, (30, SIZE))
+    return np.round(drawn / step) * step if step else drawn
+
+
+@pytest.mark.parametrize("step", [0.0, 0.01, 0.05, 0.2])
+def test_rounding_alone_is_neither_copy_nor_stuck(step: float) -> None:
+    for _ in range(5):
+        drawn = rows(step)
+        assert copies(drawn) is None
+        assert still(drawn, noise_of(drawn), 3) is None
+        assert still(drawn[:1], noise_of(drawn[:1, :200]), 3) is None
+
+
+@pytest.mark.parametrize("step", [0.0, 0.01, 0.05])
+def test_a_buffer_written_again_is_found_where_it_stands(step: float) -> None:
+    drawn = rows(step)
+    drawn.ravel()[20 * SIZE + 500 : 22 * SIZE + 100] = drawn.ravel()[3 * SIZE + 77 : 3 * SIZE + 77 + SIZE + 320].copy()
+    found = copies(drawn)
+    assert found is not None
+    assert set(found.cycles) <= {20, 21, 22}
+    place = (found.again[0] - 20) * SIZE + found.again[1] - 500
+    assert abs(place) <= 2
+    assert (found.first[0] - 3) * SIZE + found.first[1] - 77 == place
+
+
+def test_a_run_that_rounding_does_not_explain_is_named() -> None:
+    drawn = rows(0.05)
+    drawn[7, 300:321] = drawn[7, 300]
+    found = still(drawn, noise_of(drawn), 3)
+    assert found is not None
+    assert (found.cycle, found.cycles) == (7, (7,))
+    assert found.first in range(296, 301)

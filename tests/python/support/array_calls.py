@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import Pid
 from mgdd.engine import (
@@ -24,7 +23,6 @@ from mgdd.engine import (
     timing_sweep,
 )
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import Reference, VirtualEngine, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
@@ -44,12 +42,11 @@ TIME = np.arange(600) * 1e-3
 DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + 4.0 * TIME))
 MODEL = throttle.PseudoWiener("pw_r")
 ANGLE = MODEL.simulate({"time_s": TIME, "duty": DUTY})["angle_deg"].to_numpy()
-GROUPS, SMOOTH = FirstPrincipleModel(), SmoothThrottle()
+GROUPS = FirstPrincipleModel()
 CRANK = np.arange(-90.0, 91.0)
 BAR = 40.0 * np.exp(-((CRANK / 40.0) ** 2)) + 1.0
 WHOLE = np.random.default_rng(3).standard_normal(720)
 NOISE = np.random.default_rng(0).standard_normal(600)
-TEN = np.array(mgdd._core.identify.smooth_example)
 KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
 SOC = np.array([-8.0, -6.0, -4.0])
 RECORDS = surrogate.fit_surrogate(random_step_records(1500))
@@ -77,7 +74,7 @@ def ode(time: Any, u: Any, start: Any) -> Any:
 
 
 def indicating(angle: Any) -> Indicating:
-    return Indicating(angle, Cylinder(), speed_rpm=6000.0)
+    return Indicating(Cylinder(), angle, speed_rpm=6000.0)
 
 
 def run(model: Any) -> Call:
@@ -112,17 +109,12 @@ def line(x: Array) -> tuple[Array, Array]:
 
 
 def searched(x0: Any, lower: Any, upper: Any, data: Any) -> Any:
-    return optimize.least_squares(line, x0, lower=lower, upper=upper, data=data).values
+    return optimize.least_squares(line, x0, bounds=(lower, upper), data=data).values
 
 
 def logged(*columns: Any) -> Any:
     log = io.throttle_log(*columns[:3], current_a=columns[3], supply_v=columns[4])
     return [log[name].to_numpy() for name in log.variables]
-
-
-def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
-    record = {"time_s": TIME, "duty": duty, "angle_deg": angle}
-    return SMOOTH.fit(record, start_values=starts, lower=lower, upper=upper).report.values
 
 
 def swept(**options: Any) -> Any:
@@ -151,7 +143,7 @@ def calibrated(trace: Any) -> Any:
 def guided(trace: Any) -> Any:
     rough, point = Cylinder(wall_heat_scale=1.0), OperatingPoint()
     calibration = guide.OnlineCalibration(rough, window_cycles=2, steady_cycles=0)
-    seeker = optimize.ExtremumSeeking(start=-6.0, lower=-30.0, upper=10.0)
+    seeker = optimize.ExtremumSeeking(start=-6.0, bounds=(-30.0, 10.0))
     engine = guide.GuidedEngine(seeker, guide.ModelOptimum(rough), point, calibration=calibration)
     for _ in range(3):
         engine.ask()
@@ -197,7 +189,7 @@ def exchanged(row: Any) -> Any:
 
 
 def whole_cycle(pressure: Any) -> xr.Dataset:
-    return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0).noise(pressure)
+    return Indicating(Cylinder(), np.arange(-360.0, 360.0), speed_rpm=6000.0).noise(pressure)
 
 
 def queued(references: Any) -> Any:
@@ -295,13 +287,11 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "identify.FirstPrincipleModel.simulate": (run(GROUPS), (TIME, DUTY)),
     "identify.FirstPrincipleModel.predict": (ahead(GROUPS), (TIME, DUTY, ANGLE)),
     "identify.OdeModel.simulate": (ode, (TIME, DUTY, np.array([8.0]))),
-    "identify.SmoothThrottle.simulate": (run(SMOOTH), (TIME, DUTY)),
     "throttle.PseudoWiener.simulate": (run(MODEL), (TIME, DUTY)),
     "throttle.PseudoWiener.predict": (ahead(MODEL), (TIME, DUTY, ANGLE)),
     "io.pressure_checks.check_trace": (check_trace, (CRANK, BAR)),
     "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
     "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
-    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "signals.residual_tests": (lambda e, u: residual_tests(e, u).share_white, (NOISE, DUTY)),
     "signals.rmse": (rmse, (ANGLE, ANGLE + NOISE)),
     "signals.vaf_percent": (vaf_percent, (ANGLE, ANGLE + NOISE)),

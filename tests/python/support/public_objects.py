@@ -17,7 +17,7 @@ import mgdd
 import mgdd_studies
 from mgdd import _core
 
-SEEKING = {"start": 2.0, "lower": -30.0, "upper": 10.0}
+SEEKING = {"start": 2.0, "bounds": (-30.0, 10.0)}
 # Every package whose names are public, and every module.
 ROOMS = sorted(f"mgdd.{m.name}" for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_"))
 ROOMS.append("mgdd_studies")
@@ -27,7 +27,7 @@ MODULES = sorted(name for name in MODULES if "._core" not in name and not name.e
 ARGUMENTS: tuple[dict[str, Any], ...] = (
     {},
     SEEKING,
-    {"lower": -30.0, "upper": 10.0},
+    {"bounds": (-30.0, 10.0)},
     {"start": 2.0},
     {"sample_s": 1e-3},
     {"upper": 90.0},

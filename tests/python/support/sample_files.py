@@ -15,7 +15,6 @@ from mgdd import io, presets
 from mgdd.design import design_points
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import read_conditions, read_points
@@ -90,7 +89,7 @@ def _log(path: Path) -> None:
 
 def _seeker(path: Path) -> None:
     limit = Limit(name="p_max_bar", upper=110.0)
-    seeker = GradientDescent(start=-6.0, lower=-20.0, upper=10.0, limits=[limit])
+    seeker = GradientDescent(start=-6.0, bounds=(-20.0, 10.0), limits=[limit])
     for _ in range(5):
         u = float(seeker.ask()[0])
         seeker.tell(0.0 - 0.01 * u * u, limits={"p_max_bar": 90.0 - u})
@@ -178,7 +177,6 @@ SAMPLES: dict[str, Sample] = {
     "rig.export_record": Sample(_export, "rec", _record),
     "rig.RigRecord.read": Sample(RigRecord.read, "rec", _exchanges),
     "identify.FirstPrincipleModel": _of_toml(FirstPrincipleModel, lambda: FirstPrincipleModel().to_toml()),
-    "identify.SmoothThrottle": _of_toml(SmoothThrottle, lambda: SmoothThrottle().to_toml()),
     "surrogate.EngineSurrogate": _of_toml(EngineSurrogate, _surrogate),
     "surrogate.ResponseModel": _of_toml(ResponseModel, _response),
     "throttle.DemandChain": _of_toml(DemandChain, lambda: DemandChain().to_toml()),

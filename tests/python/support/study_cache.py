@@ -26,17 +26,17 @@ ALL = Path(__file__).resolve().parents[3] / "build" / "studies"
 KEPT_VERSIONS = 3
 # The quick studies of all tests: fewer seeds where the tables that are tested are the same with them.
 QUICK: dict[str, dict[str, int]] = {
-    "calibrated-guide": {"seeds": 2},
-    "guide-accuracy": {"seeds": 4},
-    "guided-start-up": {"seeds": 6},
-    "guided-transients": {"seeds": 2},
-    "ignition-delay": {"seeds": 3},
-    "measured-engine-seek": {"seeds": 1},
-    "model-validation": {"seeds": 6},
-    "online-calibration": {"seeds": 2},
-    "seekers-several-inputs": {"seeds": 4},
-    "sensor-delay": {"seeds": 4},
-    "throttle-first-principle": {"seeds": 1},
+    "calibrated-guide": {"n_seeds": 2},
+    "guide-accuracy": {"n_seeds": 4},
+    "guided-start-up": {"n_seeds": 6},
+    "guided-transients": {"n_seeds": 2},
+    "ignition-delay": {"n_seeds": 3},
+    "measured-engine-seek": {"n_seeds": 1},
+    "model-validation": {"n_seeds": 6},
+    "online-calibration": {"n_seeds": 2},
+    "seekers-several-inputs": {"n_seeds": 4},
+    "sensor-delay": {"n_seeds": 4},
+    "throttle-first-principle": {"n_seeds": 1},
     "throttle-pseudo-wiener": {"starts": 4},
 }
 

@@ -258,7 +258,7 @@ def test_a_sweep_is_fitted_over_its_inputs_and_over_nothing_else():
     cases = {
         name: column.ravel() for name, column in zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True)
     }
-    listed = sweep(Cylinder(), OperatingPoint(), cases, points=True)
+    listed = sweep(Cylinder(), OperatingPoint(), cases, pointwise=True)
     fits["points"] = fit_response(listed, "efficiency_gross")
     table = pd.DataFrame({**cases, "efficiency_gross": listed["efficiency_gross"].to_numpy()})
     fits["told"] = fit_response(table, "efficiency_gross", factors=["soc_cad", "fuel_mg"])

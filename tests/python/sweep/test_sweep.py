@@ -100,12 +100,12 @@ def test_what_fits_alone_but_not_together_is_refused_with_its_case() -> None:
 
 def test_points_are_rows_of_columns() -> None:
     columns = {"speed_rpm": [1000.0, 2600.0, 1000.0], "soc_cad": [-3.0, -14.0, -3.0], "stroke_mm": [80.0, 90.0, 80.0]}
-    table = sweep(CYLINDER, POINT, columns, points=True)
+    table = sweep(CYLINDER, POINT, columns, pointwise=True)
     assert dict(table.sizes) == {"point": 3}
     check_labels(table)
     for place in range(3):
         assert_is_single(table.isel(point=place), {name: values[place] for name, values in columns.items()})
-    frame = sweep(CYLINDER, POINT, pd.DataFrame(columns), points=True)
+    frame = sweep(CYLINDER, POINT, pd.DataFrame(columns), pointwise=True)
     assert frame.identical(table)
     design = xr.Dataset({name: ("point", values) for name, values in columns.items()}, {"point": [7, 3, 5]})
     designed = sweep(CYLINDER, POINT, design)
@@ -137,17 +137,17 @@ def test_only_what_is_wanted() -> None:
 
 def test_traces_on_request() -> None:
     grid = {"soc_cad": [-9.0, 1.0], "fuel_mg": [10.0, 25.0, 15.0]}
-    table = sweep(CYLINDER, POINT, grid, traces=True, step_cad=2.0)
+    table = sweep(CYLINDER, POINT, grid, keep_traces=True, step_cad=2.0)
     check_labels(table)
     assert table["pressure_bar"].dims == ("soc_cad", "fuel_mg", "crank_angle_cad")
     cycle = single({"soc_cad": 1.0, "fuel_mg": 15.0}, step_cad=2.0)
     for name in ("pressure_bar", "temperature_k", "burned_fraction", "heat_loss_j_per_cad", "volume_l"):
         np.testing.assert_array_equal(table[name].sel(soc_cad=1.0, fuel_mg=15.0), cycle[name])
-    few = sweep(CYLINDER, POINT, grid, traces="pressure_bar", outputs=(), step_cad=2.0)
+    few = sweep(CYLINDER, POINT, grid, keep_traces="pressure_bar", outputs=(), step_cad=2.0)
     assert list(few.data_vars) == ["pressure_bar"]
     assert few["pressure_bar"].identical(table["pressure_bar"])
     with pytest.raises(ParameterError, match="traces: not over evo_cad"):
-        sweep(CYLINDER, POINT, {"evo_cad": [120.0, 130.0]}, traces=True)
+        sweep(CYLINDER, POINT, {"evo_cad": [120.0, 130.0]}, keep_traces=True)
 
 
 # --- executors ----------------------------------------------------------------------------------------------
@@ -181,7 +181,7 @@ def chunked(kept: list[Any] = []) -> Any:  # noqa: B006 - the whole is computed 
     from mgdd.sweep.cycles import NOX, Request
 
     if not kept:
-        cases = cases_of(GRID, points=False)
+        cases = cases_of(GRID, pointwise=False)
         request = Request(
             cylinder=CYLINDER, point=POINT, soc_cad=-6.0, names=tuple(GRID),
             outputs=(*_core.engine.indicator_units(), *NOX), traces=(), step_cad=1.0, integrator="trapezoid",
@@ -215,7 +215,7 @@ def test_a_lost_worker_hands_over_what_is_done(table: xr.Dataset) -> None:
 def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixture) -> None:
     grid = {"speed_rpm": [1500.0, 100.0, 120.0], "wall_heat_scale": [1.0, 100.0]}
     with caplog.at_level(logging.WARNING):
-        table = sweep(CYLINDER, POINT, grid, traces="pressure_bar", step_cad=5.0)
+        table = sweep(CYLINDER, POINT, grid, keep_traces="pressure_bar", step_cad=5.0)
     assert np.isnan(table["pressure_bar"].values).all(axis=-1).tolist() == np.isnan(table["p_max_bar"].values).tolist()
     assert np.isnan(table["p_max_bar"].values).tolist() == [[False, False], [False, True], [False, True]]
     assert all(np.isnan(table[name].values[1:, 1]).all() for name in table.data_vars)
@@ -260,16 +260,19 @@ def test_bad_points_and_outputs() -> None:
 
     columns = {"soc_cad": [-6.0, -5.0], "fuel_mg": [1.0, 2.0, 3.0]}
     refused(
-        columns, r"one length, these have \{'soc_cad': 2, 'fuel_mg': 3\}; leave points out", ShapeError, points=True
+        columns,
+        r"one length, these have \{'soc_cad': 2, 'fuel_mg': 3\}; a grid is",
+        ShapeError,
+        pointwise=True,
     )
-    refused({"soc_cad": [-6.0, -99.0, -7.0]}, "soc_cad = -99", points=True)
+    refused({"soc_cad": [-6.0, -99.0, -7.0]}, "soc_cad = -99", pointwise=True)
     refused(
         {"soc_cad": [0.0]},
         "outputs = 'imep_gros_bar': must be a known name: did you mean 'imep_gross_bar'.*p_max_bar",
         outputs="imep_gros_bar",
     )
     refused({"soc_cad": [0.0]}, "names that differ", outputs=["p_max_bar", "p_max_bar"])
-    refused({"soc_cad": [0.0]}, "traces = 'pressure': must be a known name", traces="pressure")
+    refused({"soc_cad": [0.0]}, "keep_traces = 'pressure': must be a known name", keep_traces="pressure")
     refused({"soc_cad": [0.0]}, "step_cad", step_cad=0.0)
     refused({"soc_cad": [0.0]}, "integrator", integrator="rk4")
 
@@ -282,4 +285,4 @@ def test_an_absurd_size_is_refused_with_its_bytes() -> None:
     ):
         sweep(CYLINDER, POINT, grid)
     with pytest.raises(ParameterError, match=r"bytes \(.* GiB\), more than the \d+ GiB of this machine"):
-        sweep(CYLINDER, POINT, {"soc_cad": np.linspace(-20.0, 10.0, 10**7)}, traces=True)
+        sweep(CYLINDER, POINT, {"soc_cad": np.linspace(-20.0, 10.0, 10**7)}, keep_traces=True)

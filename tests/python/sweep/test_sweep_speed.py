@@ -51,43 +51,6 @@ def expected(rows: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
     return np.array(out)
 
 
-def contender(load: Any, name: str, e: Any, task: str) -> Any:
-    if name.startswith("numba"):
-        pytest.importorskip("numba")
-        form = name.split()[1]
-        return load("peers.numba_sweep").compile_sweep(
-            "cut" if form == "prange" else form, e, parallel=form == "prange"
-        )
-    if name == "jax":
-        pytest.importorskip("jax")
-        return load("peers.jax_cycle").compile_sweep(e, shared=task == "sweep", batch=16)
-    if name == "numpy":
-        return lambda rows: load("peers.numpy_cycle").numpy_cycles(e, rows, block=16)
-    return lambda rows: load("peers.python_cycle").python_cycles(e, rows)
-
-
-NAMES = ("python", "numpy", "numba literal", "numba cut", "numba prange", "jax")
-
-
-@pytest.mark.parametrize(
-    ("name", "task"), [(name, task) for name in NAMES for task in ("sweep", "points")] + [("numba shared", "sweep")]
-)
-def test_contender_solves_the_cycle_of_the_package(
-    load: Any, cases: dict[str, np.ndarray], name: str, task: str
-) -> None:
-    module = load("peers.cycle_cases")
-    rows = cases[task]
-    figures = contender(load, name, engine(module), task)(rows)
-    np.testing.assert_allclose(figures, expected(rows, module.FIGURES), rtol=1e-9, atol=1e-9)
-
-
-def test_shared_compression_does_not_depend_on_the_order(load: Any, cases: dict[str, np.ndarray]) -> None:
-    pytest.importorskip("numba")
-    run = load("peers.numba_sweep").compile_sweep("shared", engine(load("peers.cycle_cases")))
-    backwards = np.ascontiguousarray(cases["sweep"][::-1])
-    np.testing.assert_array_equal(run(backwards)[::-1], run(cases["sweep"]))
-
-
 @pytest.mark.parametrize(("task", "tolerance"), [("sweep", 1e-6), ("points", 1e-9)])
 def test_our_call_hands_over_what_varies(load: Any, cases: dict[str, np.ndarray], task: str, tolerance: float) -> None:
     ours = load("peers.cycle_contenders").batch(threads=1, tolerance=tolerance)

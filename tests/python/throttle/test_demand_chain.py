@@ -50,6 +50,7 @@ def test_files_dicts_and_copies_are_exact(chain: DemandChain) -> None:
         assert twin == chain
         assert type(twin) is DemandChain
         assert hash(twin) == hash(chain)
+    assert eval(repr(chain), {"DemandChain": DemandChain, "PedalMap": PedalMap}) == chain
     assert chain.replace(leak_mm2=4.0) != chain
     assert PedalMap(**chain.pedal_map.to_dict()) == chain.pedal_map
 
@@ -84,9 +85,16 @@ def test_a_refused_value_names_itself() -> None:
         DemandChain().replace(bore=52.0)
     with pytest.raises(ParameterError, match="PedalMap"):
         DemandChain().replace(pedal_map=3.0)
-    with pytest.raises(ParameterError) as error:
-        PedalMap(pedal_percent=[0, 50], speed_rpm=[900, 5000], wanted_nm=[[1, 2], [3, 1]])
-    assert error.value.field == "wanted_nm[1][1]"
+    good = {"pedal_percent": [0, 50], "speed_rpm": [900, 5000], "wanted_nm": [[1, 2], [3, 4]]}
+    for wrong, field in (
+        ({"wanted_nm": [[1, 2], [3, 1]]}, "wanted_nm[1][1]"),
+        ({"wanted_nm": [[1, 2], [3, math.nan]]}, "wanted_nm[1][1]"),
+        ({"pedal_percent": [0, 101]}, "pedal_percent[1]"),
+        ({"speed_rpm": [0, 5000]}, "speed_rpm[0]"),
+    ):
+        with pytest.raises(ParameterError) as error:
+            PedalMap(**{**good, **wrong})
+        assert error.value.field == field
     with pytest.raises(ShapeError, match="2 x 3"):
         PedalMap(pedal_percent=[0, 50], speed_rpm=[900, 3000, 5000], wanted_nm=[[1, 2], [3, 4]])
     with pytest.raises(ShapeError, match="full_load_nm"):

@@ -197,17 +197,6 @@ def test_a_long_run_in_pieces_is_the_same_run():
     np.testing.assert_array_equal(whole["angle_deg"], halves["angle_deg"][1])
 
 
-def test_lanes_give_the_bits_of_single_runs():
-    throttles = [P1.replace(coulomb_nm=0.2 + 0.01 * i, limp_home_deg=8.0 + i) for i in range(11)]
-    duty = 0.3 * np.sin(np.arange(1500) * 0.02)
-    runs = simulate_throttle(throttles, duty, airflow_torque_nm=-0.05, supply_v=13.0)
-    assert runs["start_deg"].values.tolist() == [8.0 + i for i in range(11)]
-    check_labels(runs)
-    for i, throttle in enumerate(throttles):
-        one = simulate_throttle(throttle, duty, airflow_torque_nm=-0.05, supply_v=13.0)
-        np.testing.assert_array_equal(runs["angle_deg"][i], one["angle_deg"])
-
-
 def test_ctrl_c_ends_a_long_run():
     def interrupt(*_):
         raise KeyboardInterrupt

@@ -58,15 +58,4 @@ MGDD_INLINE SpringLoad<T, C> limp_home_spring(const T& x, const SpringSide<C>& u
   return spring_of_side(x, share, stiffness, preload, select(share == ratio, preload * over_ramp, C(0.0)));
 }
 
-/// The torque with the smooth ramp tanh(ratio), whose value the caller knows; one spring on both sides.
-template <class T>
-struct SmoothSpring {
-  T elastic, preload;
-};
-template <class T, class C>
-MGDD_INLINE SmoothSpring<T> smooth_spring(const T& x, const T& tanh_ratio, const C& stiffness,
-                                          const C& preload) noexcept {
-  return {stiffness * x, preload * tanh_ratio};
-}
-
 }  // namespace mgdd::dynamics

@@ -43,28 +43,42 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
     on[i] = cubic_weights(axes_[i], interval_of(axes_[i], held), held);
     if (held != at[own]) on[i].slope.fill(0.0);
   }
-  double value = 0.0;
-  slopes.setZero();
-  while (true) {  // over the nodes around, the last axis fastest
+  // The nodes around, then without their last axis, and so on: what is left of the value and of every slope.
+  constexpr std::size_t around = 1024;
+  static_assert(most_inputs == 5);  // of four nodes each
+  std::array<double, around> value;
+  std::array<std::array<double, around / 4>, most_inputs> slope;
+  std::size_t left = 0;
+  for (bool more = true; more; ++left) {
     std::size_t node = 0;
-    double weight = 1.0;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < n; ++i)
       node += (on[i].first + step[i]) * stride[i];
-      weight *= on[i].value[step[i]];
-    }
-    value += weight * values_[node];
-    for (std::size_t i = 0; i < n; ++i) {
-      double slope = on[i].slope[step[i]];
-      for (std::size_t j = 0; j < n; ++j) {
-        if (j != i) slope *= on[j].value[step[j]];
-      }
-      slopes[static_cast<Eigen::Index>(i)] += slope * values_[node];
-    }
+    value[left] = values_[node];
     std::size_t axis = n;
     while (axis > 0 && ++step[axis - 1] == on[axis - 1].count)
       step[--axis] = 0;
-    if (axis == 0) return value;
+    more = axis > 0;
   }
+  for (std::size_t i = n; i-- > 0;) {
+    const CubicWeights& own = on[i];
+    left /= own.count;
+    const auto contract = [&](const double* from, const auto& weights) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < own.count; ++k)
+        sum += weights[k] * from[k];
+      return sum;
+    };
+    for (std::size_t p = 0; p < left; ++p) {
+      const std::size_t from = p * own.count;
+      slope[i][p] = contract(&value[from], own.slope);
+      for (std::size_t k = i + 1; k < n; ++k)
+        slope[k][p] = contract(&slope[k][from], own.value);
+      value[p] = contract(&value[from], own.value);
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i)
+    slopes[static_cast<Eigen::Index>(i)] = slope[i][0];
+  return value[0];
 }
 
 }  // namespace mgdd::optimize

@@ -70,8 +70,8 @@ void MapSeeking::keep_best(Place& place, int from, int count) noexcept {
   place.excess = over_[static_cast<std::size_t>(best)];
 }
 
-// Of every place its best input, some from everywhere, and a cloud around the best at distances of all sizes.
-void MapSeeking::scatter(std::span<const Place> places) noexcept {
+// Of every place its best input, some from everywhere, and so many around the best at distances of all sizes.
+void MapSeeking::scatter(std::span<const Place> places, int around) noexcept {
   int row = 0;
   for (const Place& place : places) {
     put(row++, place.context, place.best);
@@ -82,8 +82,8 @@ void MapSeeking::scatter(std::span<const Place> places) noexcept {
       z[0] = (p + z[0]) / spread;
       put(row, place.context, z);
     }
-    for (int p = 0; p < near; ++p, ++row) {
-      const double distance = cloud_nearest * std::pow(cloud_farthest / cloud_nearest, (p + 0.5) / near);
+    for (int p = 0; p < around; ++p, ++row) {
+      const double distance = cloud_nearest * std::pow(cloud_farthest / cloud_nearest, (p + 0.5) / around);
       Inputs z = place.best;
       for (Eigen::Index i = 0; i < inputs_; ++i)
         z[i] += distance * normal(410 + static_cast<std::uint64_t>(i), row);
@@ -97,11 +97,11 @@ void MapSeeking::scatter(std::span<const Place> places) noexcept {
 void MapSeeking::search(std::span<Place> places) noexcept {
   for (Place& place : places)
     place.best = place.from;
-  scatter(places);
+  scatter(places, 0);
   int from = 0;
   for (Place& place : places) {
-    keep_best(place, from, per_place);
-    from += per_place;
+    keep_best(place, from, 1 + spread);
+    from += 1 + spread;
   }
   double width = map_width;
   for (int round = 0; round < map_rounds; ++round, width *= map_shrinks) {
@@ -124,7 +124,7 @@ void MapSeeking::search(std::span<Place> places) noexcept {
     }
   }
   know_edges(places);
-  scatter(places);
+  scatter(places, near);
   choose_safe(places);
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd import _core
 from mgdd._core.optimize import Limit
@@ -14,13 +14,11 @@ from mgdd.errors import ConvergenceError, Interrupted
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
+from mgdd.identify.engine.tdc import TdcEstimate
 from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming, undetermined
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.parallel.finished import hand_over
 from mgdd.presets.meant import CylinderLike, PointLike
-
-if TYPE_CHECKING:
-    from mgdd.identify.engine.tdc import TdcEstimate
 
 _MARGIN_CAD = 15.0  # the search reaches this far beyond the fitted timing
 

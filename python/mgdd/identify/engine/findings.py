@@ -57,14 +57,14 @@ class Plausibility:
             if not getattr(self, name) > 0.0:
                 raise ParameterError.of(name, getattr(self, name), "> 0")
 
-    def of_model(self, model: Cylinder) -> Iterator[Finding]:
+    def of_model(self, cylinder: Cylinder) -> Iterator[Finding]:
         """Give what is not plausible of the parameters that all traces share."""
-        name = GAMMA_PARAMETER[model.gamma_model]
+        name = GAMMA_PARAMETER[cylinder.gamma_model]
         for code, field, what, (low, high) in (
             ("implausible_wall_heat", "wall_heat_scale", "wall heat", self.wall_heat_range),
             ("implausible_gamma", name, "gamma", self.gamma_range),
         ):
-            value = float(getattr(model, field))
+            value = float(getattr(cylinder, field))
             if not low <= value <= high:
                 digits = 2 if field == "wall_heat_scale" else 3
                 yield Finding(code, (field,), f"{what} {value:.{digits}f} outside {low:g} to {high:g}")

@@ -13,7 +13,7 @@ from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.findings import WIDTHS
-from mgdd.identify.engine.records import CylinderFit, starts_of
+from mgdd.identify.engine.records import CylinderFit, rmse_of, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import Result
@@ -147,8 +147,8 @@ def wall_heat_profile(
     if math.isfinite(fit.report.rmse):
         for scale in sorted({*scales, 0.0, UPPER}, key=lambda s: abs(s - value)):
             refit(float(scale))
-    best = min(fits, key=lambda scale: _rmse(fits[scale]))
-    level = _RISE * _rmse(fits[best])
+    best = min(fits, key=lambda scale: rmse_of(fits[scale]))
+    level = _RISE * rmse_of(fits[best])
     low = _crossing(refit, fits, best, level, -1)
     high = _crossing(refit, fits, best, level, +1)
     moved = _moved(fit, used, progress) if math.isfinite(fit.report.rmse) else {}
@@ -158,7 +158,7 @@ def wall_heat_profile(
     )
     correlation, partner = _correlation(fit)
     reasons = (
-        *_reasons(fit, best, _rmse(fits[best]), correlation, partner, low, high),
+        *_reasons(fit, best, rmse_of(fits[best]), correlation, partner, low, high),
         *_reasons_of_moves(moved, used, best, value, possible),
     )
     return WallHeatProfile(
@@ -214,10 +214,6 @@ def _with_offset(request: Request, name: str, offset: float, gamma: str) -> Requ
     return request.shifted(pressure_bar=offset) if name == "pegging_bar" else request.shifted(angle_cad=offset)
 
 
-def _rmse(fit: CylinderFit) -> float:
-    return fit.report.rmse if math.isfinite(fit.report.rmse) else math.inf
-
-
 def _crossing(
     refit: Callable[[float], CylinderFit], fits: dict[float, CylinderFit], best: float, level: float, side: int
 ) -> float:
@@ -228,8 +224,8 @@ def _crossing(
         return math.nan
     inside = best
     for scale in sorted((s for s in fits if (s - best) * side > 0.0), key=lambda s: abs(s - best)):
-        if _rmse(fits[scale]) > level:
-            return float(brentq(lambda s: min(_rmse(refit(float(s))), 1e6) - level, inside, scale, xtol=2e-3))
+        if rmse_of(fits[scale]) > level:
+            return float(brentq(lambda s: min(rmse_of(refit(float(s))), 1e6) - level, inside, scale, xtol=2e-3))
         inside = scale
     return inside  # the outermost scale is the bound: both ends of [0, 2.5] are always refitted
 

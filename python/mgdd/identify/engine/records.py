@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +13,6 @@ from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.results.result import Result
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy as np
     import xarray as xr
 
@@ -107,6 +107,11 @@ class CylinderFit(Fit):
     table: xr.Dataset
     correlation_if_free: np.ndarray
     request: Request
+
+
+def rmse_of(fit: CylinderFit) -> float:
+    """Give the error of a fit, infinite where the search failed."""
+    return fit.report.rmse if math.isfinite(fit.report.rmse) else math.inf
 
 
 def burn_law(cylinder: Cylinder) -> str:

@@ -15,7 +15,7 @@ from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import of_law
-from mgdd.identify.engine.records import CylinderFit, starts_of
+from mgdd.identify.engine.records import CylinderFit, rmse_of, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Bounds, Request, closed
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of
 from mgdd.results.labels import labelled_dataset
@@ -289,7 +289,7 @@ def _best_at(request: Request, offset: float, neighbours: dict[float, CylinderFi
             raise
     if neighbours:
         fits.append(_from(neighbours[min(neighbours, key=lambda other: abs(other - offset))], moved))
-    return min(fits, key=_rmse)
+    return min(fits, key=rmse_of)
 
 
 def _from(near: CylinderFit, moved: Request) -> CylinderFit:
@@ -299,15 +299,11 @@ def _from(near: CylinderFit, moved: Request) -> CylinderFit:
 def _smooth(request: Request, fits: dict[float, CylinderFit]) -> None:
     """Fit again, outwards from the best, from the inner neighbour: the first fits may stay in another minimum."""
     offsets = sorted(fits)
-    best = min(range(len(offsets)), key=lambda k: _rmse(fits[offsets[k]]))
+    best = min(range(len(offsets)), key=lambda k: rmse_of(fits[offsets[k]]))
     for way in (range(best - 1, -1, -1), range(best + 1, len(offsets))):
         for k in way:
             near, offset = fits[offsets[k - way.step]], offsets[k]
-            fits[offset] = min(fits[offset], _from(near, request.shifted(angle_cad=-offset)), key=_rmse)
-
-
-def _rmse(fit: CylinderFit) -> float:
-    return fit.report.rmse if np.isfinite(fit.report.rmse) else math.inf
+            fits[offset] = min(fits[offset], _from(near, request.shifted(angle_cad=-offset)), key=rmse_of)
 
 
 def _vertex(x: np.ndarray, y: np.ndarray, at: int) -> float:

@@ -6,19 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.io.parameters import ModelParameters, Wanted, wanted
 from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 GROUP_NAMES = tuple(_core.identify.group_names)
 # What a throttle need not have: without a word its friction does not drop or bend, its gear has no gap, its

@@ -10,7 +10,6 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.first_principle_model import (
     GROUP_NAMES,
     LONGEST_DELAY,
@@ -119,7 +118,6 @@ class GroupsProblem:
 def groups_problem(
     log: xr.Dataset,
     *,
-    free: Sequence[str] = (),
     start_values: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     stops_deg: tuple[float, float] = (0.0, 90.0),
@@ -128,7 +126,7 @@ def groups_problem(
     time, duty, angle = log_columns(log)
     step_s = even_step(time, remedy=f"read_throttle_log(..., {argument('sample_s', '{step:g}')}) resamples")
     given = {name: float(value) for name, value in {**(start_values or {}), **(fixed or {})}.items()}
-    for name in [*given, *free]:
+    for name in given:
         if name not in GROUP_NAMES:
             raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
     if np.ptp(angle) < 1.0:
@@ -136,11 +134,7 @@ def groups_problem(
     values = dict(TYPICAL)
     values["limp_home_deg"] = rest_angle(step_s, duty, angle, values["limp_home_deg"])
     values |= given
-    searched = [
-        name
-        for name in GROUP_NAMES
-        if name not in (fixed or {}) and (name in free or name not in (*REFINEMENTS, "electrical_s"))
-    ]
+    searched = [name for name in GROUP_NAMES if name not in (*(fixed or {}), *REFINEMENTS, "electrical_s")]
     findings: list[Finding] = []
     unvisited: list[str] = []
     home = values["limp_home_deg"]
@@ -279,19 +273,3 @@ def regression_start(
         if damping > 0.0 and "tau_s" in free:
             positive["tau_s"] = inertia / damping
     return positive
-
-
-def group_starts(values: Mapping[str, float], free: list[str], n_starts: int, seed: int) -> list[list[float]]:
-    """Spread the free groups that are searched as logarithms from half to twice their first value."""
-    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
-    box = [
-        _core.optimize.Parameter(
-            name=name,
-            lower=max(bounds[name].lower, 0.5 * values[name]),
-            upper=min(bounds[name].upper, 2.0 * values[name]),
-            log_scaled=True,
-        )
-        for name in free
-        if bounds[name].log_scaled
-    ]
-    return [[start[name] for name in GROUP_NAMES] for start in spread_starts(values, box, n_starts, seed)]

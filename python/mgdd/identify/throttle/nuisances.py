@@ -6,20 +6,16 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, LONGEST_DELAY, whole_shift
+from mgdd.identify.throttle.first_principle_problem import GroupsProblem
 from mgdd.identify.throttle.free_run import noise_of
 from mgdd.identify.throttle.whole_delay import AT_NOISE, FLOOR_DEG
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from mgdd.identify.throttle.first_principle_problem import GroupsProblem
-    from mgdd.results.fit_report import FitReport
+from mgdd.results.fit_report import FitReport
 
 SHARE, _DELAY = "viscous_share", "delay_samples"
 # A shorted motor brakes more than its bearings: what is not back-EMF is anything from none to half of the damping.

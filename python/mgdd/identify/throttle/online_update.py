@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.throttle import PseudoWiener
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 _ALL = ("tau_s", "gain_deg_per_s2_per_duty", "preload_duty", "spring_duty_per_deg", "coulomb_duty")
 

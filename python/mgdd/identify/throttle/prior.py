@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.errors import ParameterError
 from mgdd.presets.meant import throttle_model_of
 from mgdd.throttle import Throttle, simulate_throttle
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _TRAVEL_DEG = (0.0, 90.0)
 _MARGIN_DEG = 1.0

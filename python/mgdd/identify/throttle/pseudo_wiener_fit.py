@@ -35,7 +35,6 @@ def fit_pseudo_wiener(
     sides: str = "shared",
     free: Sequence[str] = (),
     delay_samples: float | Sequence[float] = 0,
-    plays: int = 1,
     start_values: PseudoWiener | None = None,
     settings: Mapping[str, float] | None = None,
     lag_start: str = "best",
@@ -47,8 +46,6 @@ def fit_pseudo_wiener(
     ----------
     log : Dataset, DataFrame or mapping of columns, or a sequence of them
         ``duty`` [-] and ``angle_deg`` [deg] over an even ``time_s`` [s].
-    kind : {"pw_r", "pw_w", "pw_p"}
-        Friction and preload inside the block; strict Wiener; Wiener with play.
     limp_home_deg : float, optional
         Limp-home angle [deg]; the first angle of the first log if left out, which must then start at rest there.
     sides : {"shared", "above", "below", "both"}
@@ -58,8 +55,6 @@ def fit_pseudo_wiener(
         coulomb_duty`` without, further ``square_per_deg cube_per_deg2 limp_home_deg``; for the others all.
     delay_samples : float or sequence of float
         Delay of the duty, 0 to 5 samples; of several the best is kept.
-    plays : int
-        PW-P: number of plays, 1 to 8.
     start_values : PseudoWiener, optional
         A single search from here, instead of many.
     settings : mapping of str to float, optional
@@ -87,8 +82,6 @@ def fit_pseudo_wiener(
     if base.kind != kind:
         raise ParameterError(f"start_values is a {base.kind}: must be a {kind}")
     values: dict[str, float] = {**base.at_sample(sample_s).parameters, "limp_home_deg": limp_home}
-    if kind == "pw_p" and start_values is None:
-        values["plays"] = float(plays)
     if lag_start not in ("best", "rest", "map"):
         raise ParameterError.of("lag_start", lag_start, "one of best, rest, map")
     if lag_start != "best" and "map_start" in values:

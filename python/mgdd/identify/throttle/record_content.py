@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd.results.finding import Finding
 from mgdd.results.result import NumbersResult
 from mgdd.signals.even_grid import even_step
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
 
 # Speed and travel are taken over 20 ms, travel with a play of 0.1 deg: beyond the noise of a 12-bit sensor.
 _SPEED_WINDOW_S = 0.02

@@ -7,9 +7,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd.errors import Interrupted
@@ -17,9 +18,6 @@ from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search
 from mgdd.identify.throttle.free_run import noise_of
 from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Steps per sample of the look at bristles, and of what is handed over.
 BRISTLES, FINE = 4, 8

@@ -167,6 +167,11 @@ class CanRig:
         self._inbox, self._sender = Inbox(self.map), Sender()
 
     @property
+    def objective(self) -> Mapping[str, float]:
+        """Weights of the measured values in J, by name."""
+        return self.map.objective
+
+    @property
     def state(self) -> str:
         """State that the node reported last; empty where it reports none."""
         return self._inbox.state

@@ -6,9 +6,10 @@ import math
 from array import array
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd.errors import DataError
@@ -21,9 +22,6 @@ from mgdd.rig.experiment.tasks import Outcome, TrackPlan, compared
 from mgdd.rig.recorded import RecordedRun
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import SafetyGate, said_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 LOOP_TABLE = "loop"  # of a record: a row per cycle of the loop
 RUN = _core.rig.safety_states.index("run")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd import _core
 from mgdd._core.rig import Frame
@@ -15,9 +16,6 @@ from mgdd.results.labels import named_label
 from mgdd.rig.can.link import Inbox
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.live.record_tail import News
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 EDGES_US = np.logspace(-1, 7, 65)  # eight bins per decade, as the loop of the core counts
 _MOST_ROWS = 1 << 19

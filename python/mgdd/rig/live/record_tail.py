@@ -5,15 +5,13 @@ from __future__ import annotations
 import struct
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mgdd._core import rig as core
 from mgdd.errors import Error
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _HEAD = struct.Struct("<IIBBHIq")  # length, crc32, kind, flags, two numbers, stamp: see docs/rig_record.md
 _FRAME, _NAMES, _SAMPLE, _EVENT = 1, 2, 3, 4

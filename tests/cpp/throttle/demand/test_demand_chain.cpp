@@ -1,16 +1,13 @@
-// From the pedal to the reference of the plate: the table of the pedal, round trips, laws of the reference (rate,
-// filter, bumpless start, takeover, repeated inputs, restart), refusals, no allocation.
-#include "mgdd/throttle/demand/demand_chain.hpp"
-
+// From a pedal to the angle of the plate: the chain, and its tracker sample by sample.
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
+#include "mgdd/throttle/demand/demand_chain.hpp"
 #include "support/demand_case.hpp"
+#include "support/no_alloc.hpp"
 
 namespace mgdd::throttle {
 namespace {
@@ -116,34 +113,6 @@ TEST(Demand, NothingThatAMeasuredPressureCanBeGivesAJump) {
   }
 }
 
-TEST(DemandChain, ARefusedParameterNamesItself) {
-  const auto refused = [](const std::string& field, const std::function<void(DemandChain&)>& change) {
-    DemandChain chain = odd_chain();
-    change(chain);
-    try {
-      (void)DemandTracker(chain, sample);
-      ADD_FAILURE() << field << " was taken";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.field, field);
-    }
-  };
-  refused("discharge_45", [](DemandChain& c) { c.bore.discharge_45 = 0.7; });
-  refused("pedal_percent", [](DemandChain& c) { c.pedal_map.pedal_percent = {0.0}; });
-  refused("pedal_percent[7]", [](DemandChain& c) { c.pedal_map.pedal_percent[7] = 101.0; });
-  refused("speed_rpm[0]", [](DemandChain& c) { c.pedal_map.speed_rpm[0] = 0.0; });
-  refused("wanted_nm", [](DemandChain& c) { c.pedal_map.wanted_nm.pop_back(); });
-  refused("wanted_nm[3][2]", [](DemandChain& c) { c.pedal_map.wanted_nm[3 * 8 + 2] = nan; });
-  refused("wanted_nm[3][2]", [](DemandChain& c) { c.pedal_map.wanted_nm[3 * 8 + 2] = -20.0; });
-  for (const double bad : {0.0, 1.5, nan}) {
-    try {
-      (void)DemandTracker(odd_chain(), bad);
-      ADD_FAILURE();
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, "sample_s");
-    }
-  }
-}
-
 TEST(DemandChain, EveryNumberHasOneField) {
   DemandChain chain;
   double at = 0.5;
@@ -154,6 +123,85 @@ TEST(DemandChain, EveryNumberHasOneField) {
   at = 0.5;
   for (const auto& field : demand_fields())
     EXPECT_EQ(field.in(chain), at += 1.0);
+}
+
+static_assert(noexcept(std::declval<DemandTracker&>().step(0.0, 0.0, 0.0)));
+
+TEST(Tracker, WithoutAMeasuredPressureItTakesTheWantedOne) {
+  DemandTracker with(odd_chain(), sample), without(odd_chain(), sample);
+  for (int k = 0; k < 400; ++k) {
+    const double pedal = k < 50 ? 12.0 : 70.0;
+    const TrackedDemand blind = without.step(pedal, 2600.0, nan);
+    const TrackedDemand told = with.step(pedal, 2600.0, blind.pressure_pa);
+    EXPECT_EQ(told.reference_deg, blind.reference_deg) << k;
+  }
+}
+
+TEST(Tracker, TheReferenceKeepsItsRateAndSettlesWithItsFilter) {
+  DemandChain chain = odd_chain();
+  chain.reference.pressure_lag_s = 0.0;
+  chain.reference.filling_share = 0.0;
+  chain.reference.reference_rate_deg_per_s = 300.0;
+  DemandTracker tracker(chain, sample);
+  const DemandModel model(chain);
+  double last = tracker.step(5.0, 1500.0, nan).reference_deg;
+  const double target = model.steady(90.0, 1500.0).opening_deg;
+  ASSERT_GT(target - last, 15.0);
+  const double way = target - last;
+  double limited = last;
+  for (int k = 0; k < 600; ++k) {
+    const TrackedDemand out = tracker.step(90.0, 1500.0, nan);
+    EXPECT_LE(std::fabs(out.reference_deg - last), 0.3 + 1e-12);
+    limited += std::fmin(0.3, target - limited);
+    const double wanted = last + (1.0 - std::exp(-0.08)) * (limited - last);
+    EXPECT_NEAR(out.reference_deg, wanted, 1e-9);
+    last = out.reference_deg;
+  }
+  EXPECT_NEAR(last, target, 1e-6 * way);
+}
+
+TEST(Tracker, InputsThatAreNotFiniteRepeatTheLastOnes) {
+  DemandTracker tracker(odd_chain(), sample), other(odd_chain(), sample);
+  EXPECT_EQ(tracker.step(nan, 1500.0, 40e3).reference_deg, 0.0);
+  EXPECT_EQ(tracker.step(20.0, nan, nan).reference_deg, other.step(20.0, 1500.0, 40e3).reference_deg);
+  for (int k = 0; k < 100; ++k) {
+    const double infinity = std::numeric_limits<double>::infinity();
+    const TrackedDemand gap = tracker.step(k % 3 == 0 ? nan : 60.0, k % 5 == 0 ? infinity : 2500.0, nan);
+    const TrackedDemand held = other.step(k == 0 ? 20.0 : 60.0, k == 0 ? 1500.0 : 2500.0, 40e3);
+    EXPECT_EQ(gap.reference_deg, held.reference_deg) << k;
+  }
+}
+
+TEST(Tracker, HoldsAtStandstillAndBeyondTheTable) {
+  DemandTracker tracker(odd_chain(), sample);
+  for (const double speed : {0.0, -100.0, 1e9}) {
+    for (const double pedal : {-20.0, 0.0, 300.0}) {
+      for (int k = 0; k < 50; ++k) {
+        const TrackedDemand out = tracker.step(pedal, speed, k % 2 == 0 ? 0.0 : 500e3);
+        EXPECT_TRUE(std::isfinite(out.reference_deg) && std::isfinite(out.air_kg_per_s));
+        EXPECT_GE(out.reference_deg, 0.0);
+        EXPECT_LE(out.reference_deg, 90.0);
+      }
+    }
+  }
+}
+
+TEST(Tracker, ResetForgetsEverything) {
+  DemandTracker tracker(odd_chain(), sample);
+  const StateColumns fresh = save_state(tracker);
+  (void)tracker.step(40.0, 1800.0, 50e3);
+  tracker.reset();
+  EXPECT_EQ(save_state(tracker), fresh);
+}
+
+TEST(Tracker, NoAllocation) {
+  DemandTracker tracker(odd_chain(), sample);
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 1000; ++k)
+    (void)tracker.step(k % 101, 800.0 + k, 30e3 + 70.0 * k);
+  tracker.take_over(3.0);
+  tracker.reset();
+  EXPECT_EQ(counter.count(), 0u);
 }
 
 }  // namespace

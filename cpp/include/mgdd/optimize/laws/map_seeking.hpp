@@ -161,7 +161,7 @@ class MapSeeking {
   void judge(int points) noexcept;
   bool safe(int point, const Place& place) const noexcept;
   bool known() const noexcept;
-  void scatter(std::span<const Place> places) noexcept;
+  void scatter(std::span<const Place> places, int around) noexcept;
   void keep_best(Place& place, int from, int count) noexcept;
   void search(std::span<Place> places) noexcept;
   void know_cells() noexcept;
