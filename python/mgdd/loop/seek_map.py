@@ -32,7 +32,9 @@ _SETTLING, _AVERAGED = 20, 50  # cycles of a visit on an engine
 _FEWEST = 10  # cycles that tell what a mean is worth
 _KNOWN = 0.5  # of what is not known at a visit: a mean that is surer teaches little more
 _FAILED = 0.5  # share of the cycles of a visit
-_ELSEWHERE = 0.01  # of an axis: a cycle that ran farther from its operating point is none of the visit
+# Of an axis, and of the bounds of an input: a cycle that ran farther from its operating point, or from the inputs of
+# the cycle before, as where a guard steps back and tries again, is none of the visit.
+_ELSEWHERE, _MOVED = 0.01, 0.05
 _SETTINGS = (
     "noise_sd", "averaged", "moving_cost", "memory_readings", "horizon", "kept", "reach", "limit_probability",
 )  # fmt: skip
@@ -327,14 +329,17 @@ def _visited(
     """Drive to a point, wait, and average; a visit at which half of the cycles fail has failed."""
     names = seeker.limit_names
     near = {name: _ELSEWHERE * float(np.ptp(entries)) for name, entries in seeker.axes.items()}
+    near |= {one.name: _MOVED * (one.upper - one.lower) for one in seeker.settings["inputs"]}
+    ran = dict(inputs)
     rows, failed = list[list[float]](), 0
     applied = {name: list[float]() for name in inputs}
     for cycle in range(dwell.settling + dwell.most):
         plant.apply({**at, **inputs})  # in every cycle: a guard moves by steps, a bus waits for the next command
         measured = plant.measure()
+        before, ran = {**ran, **at}, {**at, **inputs, **measured.applied}
         if cycle < dwell.settling:
             continue
-        if measured.misfire or any(abs(measured.applied.get(name, at[name]) - at[name]) > near[name] for name in at):
+        if measured.misfire or any(abs(ran[name] - before[name]) > width for name, width in near.items()):
             failed += 1
         else:
             row = [measured.performance, *(float(measured.limits[name]) for name in names)]
@@ -344,7 +349,7 @@ def _visited(
                 raise DataError(f"the plant read {listed} at {where}: must be finite, or a misfire")
             rows.append(row)
             for name in inputs:
-                applied[name].append(float(measured.applied.get(name, inputs[name])))
+                applied[name].append(float(ran[name]))
         counted = len(rows) + failed
         if len(rows) >= _FEWEST and dwell.least <= counted < dwell.most:
             mean_sd = float(np.std([row[0] for row in rows], ddof=1)) / math.sqrt(len(rows))

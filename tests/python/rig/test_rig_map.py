@@ -51,15 +51,16 @@ def test_a_record_gives_the_same_map_whole_and_interrupted(tmp_path: Path) -> No
     assert run.plot().get_xlabel() == "speed [rpm]"
 
 
-def test_what_is_told_was_read_at_its_point() -> None:
-    """A guard that steps back goes to another operating point, and one that is slow is on its way to one."""
-    keys = "[map]\nvisits = 8\naveraged = 20\nsettling = 0\nstart = { soc_cad = 4 }\n"
+@pytest.mark.parametrize("settling", [0, 20])
+def test_what_is_told_was_read_at_its_point(settling: int) -> None:
+    """A guard that steps back runs other points and inputs in between, and one that is slow is on its way to them."""
+    keys = f"[map]\nvisits = 8\naveraged = 20\nsettling = {settling}\nstart = {{ soc_cad = 4 }}\n"
     guard = "[safety]\nrates = { speed_rpm = 100.0, fuel_mg = 2.0 }\nlimits = { p_max_bar = 95.0 }\n"
     quiet = "[plant]\nefficiency_noise_percent = 0.1\n"
     run = run_experiment(Experiment.from_toml(HEAD + keys + AXES + quiet + guard))
     assert run.counters["guard"]["limit"] > 5
     assert 4 <= np.isfinite(off(run)).sum() < 8
-    assert np.nanmax(np.abs(off(run))) < 0.3  # points; the cells lie up to three apart
+    assert np.nanmax(np.abs(off(run))) < 0.12  # points; the cells lie up to three apart
     assert [one["code"] for one in run.figures["findings"]] == ["failed_visits"]
 
 
