@@ -65,6 +65,10 @@ COMMANDS = {
         "find the best value of an input at every operating point of a table, under limits",
         "table.nc --maximize efficiency_gross --along soc_cad --limit p_max_bar=130 --max-loss 0.002 -o best.nc",
         "map_optimize", _MAP),
+    "map seek": Command(
+        "seek a map on the virtual engine, from a rough model and as few visits of operating points as possible",
+        "--over speed_rpm=1000:2500:4 --over fuel_mg=10:25:4 --limit p_max_bar=120 --guide model "
+        "--guide-set wall_heat_scale=1.0 --visits 16 -o map.nc", "map_seek", _MAP),
     "map smooth": Command(
         "smooth a map inside of the allowed ranges of its cells, under limits on its slopes",
         "best.nc --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.nc", "map_optimize", _MAP),
@@ -108,8 +112,8 @@ COMMANDS = {
         "--controller pid --preset P2 --budget 60 --throttles 8 --json", "throttle_track"),
     "rig": Command("experiments in process, over a CAN bus and on a bench"),
     "rig run": Command(
-        "run an experiment: identify or track on a throttle, seek on an engine; in process, over a bus, on a record or "
-        "on a bench", "track.toml --mode hil --folder runs/first", "rig_run"),
+        "run an experiment: identify or track on a throttle, seek or map on an engine; in process, over a bus, on a "
+        "record or on a bench", "track.toml --mode hil --folder runs/first", "rig_run"),
     "rig check": Command(
         "check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
         "track.toml --mode bench --connection socketcan:can0 --pace real_time --json", "rig_run"),
@@ -157,7 +161,8 @@ _ALSO = {
     "engine simulate": "run cycle", "engine analyze": "analyse analysis", "engine check": "trust",
     "engine calibrate": "fit calibration", "engine optimum": "optimise optimize best", "engine seek": "search",
     "engine sweep": "grid", "map optimize": "optimise optimum build make", "map export": "convert write",
-    "map fit": "build make", "map trade-off": "pareto", "map show": "plot", "map diff": "compare", "map design": "doe",
+    "map fit": "build make", "map seek": "search", "map trade-off": "pareto", "map show": "plot", "map diff": "compare",
+    "map design": "doe",
     "throttle track": "control run", "throttle excite": "signal", "data info": "read", "data get": "download",
     "data list": "datasets --list-datasets",
     "preset list": "presets --list-presets", "study": "studies", "rig selftest": "self-test test", "doctor": "info",
@@ -168,6 +173,7 @@ _OPTIONS = {
     "--x0": "--start", "--iterations": "--cycles", "--options": "--seeker-set", "--constraint": "--limit",
     "--engine": "--preset", "--format": "--output", "--plot": "--figure", "--silent": "--quiet",
     "--rpm": "--speed-rpm", "--unit": "--pressure-unit", "--grid": "--over", "--param": "--set", "--dir": "--folder",
+    "--points": "--visits", "--cycles": "--visits",
 }
 # fmt: on
 _EPILOG = """exit codes: 0 done, 1 a self-test or replay that failed, 2 bad input or usage, 3 no convergence or no
@@ -287,7 +293,7 @@ def _fill(parser: Parser, name: str) -> None:
 
 
 def understood(words: Sequence[str], parser: Parser) -> list[str]:
-    """Give the words as the parser takes them: `help` behind, options of every command too, a verb with its group."""
+    """Give the words as the parser takes them: `help` behind, options of every command too, a verb behind its group."""
     rest, front, named = list(words), list[str](), list[str]()
     while rest and len(named) < 2:
         if rest[0] in ("-o", "--output", "--out"):
@@ -301,6 +307,8 @@ def understood(words: Sequence[str], parser: Parser) -> list[str]:
     if "help" in named:
         named.remove("help")
         rest.append("--help")
+    if len(named) == 2 and named[0] not in COMMANDS and named[1] in COMMANDS:
+        named.reverse()
     group = named[0] if named and named[0] in COMMANDS else ""
     at = 1 if group else 0
     if len(named) == at or (group and COMMANDS[group].module):

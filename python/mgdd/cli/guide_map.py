@@ -31,13 +31,18 @@ def add_guide(parser: argparse.ArgumentParser) -> None:
            "curve: the model's whole curve; calibrated: the same while the model learns from the pressure; "
            "feed_forward: the model's best timing; map: a calibration map of timings",
            default="none", choices=('none', *KINDS, 'map'))  # fmt: skip
-    option(group, "--guide-preset NAME_OR_FILE.toml", "cylinder of the model (default: that of the bench)")
-    option(group, "--guide-set FIELD=VALUE ...",
-           "any field of the model's cylinder, repeatable, for example wall_heat_scale=1.0")  # fmt: skip
+    add_model(group)
     option(group, "--guide-map FILE", f"the map of --guide map: {FORMS}")
     option(group, "--guide-map-out FILE",
            f"write that map ({', '.join(MAP_ENDINGS)}) with the best timing of this run learnt, if the run has settled",
     )  # fmt: skip
+
+
+def add_model(group: Any) -> None:
+    """Add the options of the model that guides."""
+    option(group, "--guide-preset NAME_OR_FILE.toml", "cylinder of the model (default: that of the bench)")
+    option(group, "--guide-set FIELD=VALUE ...",
+           "any field of the model's cylinder, repeatable, for example wall_heat_scale=1.0")  # fmt: skip
 
 
 def check_guide(args: argparse.Namespace) -> None:
@@ -64,7 +69,7 @@ def guide_of(args: argparse.Namespace, bench: VirtualEngine) -> TimingMap | Engi
     if args.guide == "map":
         return _read_map(args.guide_map)
     own = bench.settings
-    cylinder = _cylinder_of(args, own["cylinder"])
+    cylinder = cylinder_of(args, own["cylinder"])
     with named_options(kind="guide", shape="guide_shape"):
         return EngineGuide(
             cylinder=cylinder, kind=args.guide, performance=own["performance"], nox=own["true_nox"],
@@ -72,7 +77,8 @@ def guide_of(args: argparse.Namespace, bench: VirtualEngine) -> TimingMap | Engi
         )  # fmt: skip
 
 
-def _cylinder_of(args: argparse.Namespace, base: Cylinder) -> Cylinder:
+def cylinder_of(args: argparse.Namespace, base: Cylinder) -> Cylinder:
+    """Give the cylinder of the model: that of the bench, or another preset, with fields set."""
     if args.guide_preset is not None:
         with _named("--guide-preset", f"{args.guide_preset}: "):
             base = presets.load(args.guide_preset, kind="engine").cylinder

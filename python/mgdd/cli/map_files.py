@@ -151,6 +151,13 @@ def map_blocks(table: CalibrationMap, column: str = "value") -> list[str | Table
     return [*out, "", *grid_blocks(table.axes, table.labels, cells, f"{what} [{unit}]" if unit else what, flags)]
 
 
+def shown_map(args: argparse.Namespace, *tables: CalibrationMap) -> list[str | Table]:
+    """Lay out maps, and say how to keep them where no file is given."""
+    blocks = [block for table in tables for block in (*map_blocks(table), "")]
+    name = f"{tables[0].name}.nc" if len(tables) == 1 else "maps.cdfx"
+    return blocks[:-1] if args.output else [*blocks, f"-o {name} keeps the map{'s' if len(tables) > 1 else ''}"]
+
+
 def grid_blocks(
     axes: Mapping[str, NDArray[np.float64]],
     labels: Mapping[str, Label],

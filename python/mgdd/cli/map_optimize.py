@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import FORMS, READING, doubts_said, emit_map, grid_table, map_blocks, map_in
+from mgdd.cli.map_files import FORMS, READING, doubts_said, emit_map, grid_table, map_in, shown_map
 from mgdd.cli.options import option
 from mgdd.cli.ranges import assignments, number_pairs
 from mgdd.maps import CalibrationMap, optimize_map, smooth_map
@@ -18,7 +18,6 @@ from mgdd.maps.compare import steepest
 
 _OPTIMUM = Options(optimize_map, "max_loss", "infeasible", over="along")
 _SMOOTH = Options(smooth_map, "weight", "fill", "tolerance")
-_ENDINGS = ".csv, .json or .nc, which hold everything; .dcm or .cdfx for calibration tools"
 
 
 def _add_optimize(parser: Any) -> None:
@@ -50,7 +49,7 @@ def _optimize(args: argparse.Namespace) -> None:
             provenance={"from": " ".join(Path(args.file).name.split())},
             **_OPTIMUM.given(args),
         )
-    emit_map(args, best, _shown(args, best), n_held=_held(best))
+    emit_map(args, best, shown_map(args, best), n_held=_held(best))
 
 
 def _add_smooth(parser: Any) -> None:
@@ -80,17 +79,13 @@ def _smooth(args: argparse.Namespace) -> None:
         before = steepest(optimum, name)
         was = "" if before is None else f"; before {before:.3g}"
         said.append(f"steepest over {name}: {slope:.3g} {unit}/{smooth.labels[name].units}{limit}{was}")
-    text = [*_shown(args, smooth), "", *said]
+    text = [*shown_map(args, smooth), "", *said]
     more = {"tolerance": args.tolerance, "warnings": doubts}
     emit_map(args, smooth, text, largest_shift=shift, largest_slope=slopes_now, n_held=_held(smooth), **more)
 
 
 def _add_figure(parser: argparse.ArgumentParser) -> None:
     option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
-
-
-def _shown(args: argparse.Namespace, table: CalibrationMap) -> list[Any]:
-    return [*map_blocks(table), *([] if args.output else ["", f"-o {table.name}.json keeps the map"])]
 
 
 def _held(table: CalibrationMap) -> dict[str, int]:

@@ -46,10 +46,10 @@ _BOUNDS_CAD = (-30.0, 10.0)  # of the timing, where nobody says
 _NEAR = 40.0  # arrived: within a fortieth of the bounds, the scale that an input has by itself
 _COV = "cov_imep_percent"  # has no steady value
 # Arguments of the library and the options that set them.
-_NAMES = {**_BENCH.options, **_SEARCH.options, "start": "start", "limits": "limit", "nox_sensor": "sensor",
-          "tolerance": "tolerance", "known": "known", "inputs": "input", "guide_cylinder": "guide_set",
-          "guide_table": "guide_map",
-          "settings": "seeker_set", **{name: name for name in OperatingPoint.fields()}}  # fmt: skip
+BENCH_NAMES = {**_BENCH.options, "limits": "limit", "nox_sensor": "sensor", "inputs": "input",
+               **{name: name for name in ("start", "tolerance", *OperatingPoint.fields())}}  # fmt: skip
+_NAMES = {**BENCH_NAMES, **_SEARCH.options, "known": "known", "guide_cylinder": "guide_set",
+          "guide_table": "guide_map", "settings": "seeker_set"}  # fmt: skip
 
 
 def _add_seek(parser: Any) -> None:
@@ -70,23 +70,26 @@ def _add_seek(parser: Any) -> None:
            "which one may be left out; repeatable")  # fmt: skip
     option(parser, "--known FILE.csv", "readings of before, as -o writes them: they are told to the seeker first")
     option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
+    add_bench(parser, "none", "analyser", "soft")
+    add_guide(parser)
+    add_engine(parser)
+
+
+def add_bench(parser: Any, *sensors: str) -> None:
+    """Add the options of the bench."""
     group = parser.add_argument_group("bench")
     option(group, "--sensor",
            "none: J is the efficiency in percent; else less 0.004 per ppm NOx by that sensor",
-           default="none", choices=('none', 'analyser', 'soft'))  # fmt: skip
+           default="none", choices=sensors)  # fmt: skip
     _BENCH.add(group)
-    add_guide(parser)
-    add_engine(parser)
 
 
 def _seek(args: argparse.Namespace) -> None:
     check_guide(args)
     limits, start = limits_given(args.limit), number_pairs(args.start, "--start")
     known = None if args.known is None else read_points(args.known)
-    with _option_names():
-        given = bounds_of(args.input)
-        bench, preset = _bench(args, limits, given)
-        bounds = {name: given.get(name, _BOUNDS_CAD) for name in bench.input_names}
+    with option_names(_NAMES):
+        bench, bounds, preset = bench_of(args, limits)
         guide = guide_of(args, bench)
         best = bench.find_optimum(
             {name: value for name, value in limits.items() if name != _COV},
@@ -116,7 +119,11 @@ def _seek(args: argparse.Namespace) -> None:
         raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 
 
-def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[VirtualEngine, str]:
+def bench_of(
+    args: argparse.Namespace, limits: Mapping[str, Any]
+) -> tuple[VirtualEngine, dict[str, tuple[float, ...]], str]:
+    """Make the bench, the bounds of its inputs, and the name of its preset."""
+    inputs = bounds_of(args.input)
     for name in inputs:
         if name not in bench_inputs:
             raise ParameterError(hinted(f"--input {name}: the bench has {', '.join(bench_inputs)}", name, bench_inputs))
@@ -139,7 +146,7 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[
             if not least <= value <= greatest:
                 bound = f"must be in [{least:g}, {greatest:g}], the window of the bench"
                 raise ParameterError(f"--input {name}={bounds[0]:g}:{bounds[1]:g}: {value:g} {bound}")
-    return bench, preset.name
+    return bench, {name: inputs.get(name, _BOUNDS_CAD) for name in bench.input_names}, preset.name
 
 
 def _lags(bench: VirtualEngine) -> list[ComponentLag] | None:
@@ -229,13 +236,13 @@ def _table(cycles: xr.Dataset) -> xr.Dataset:
 
 
 @contextmanager
-def _option_names() -> Iterator[None]:
-    """Let messages and errors of the library name the options."""
+def option_names(names: Mapping[str, str]) -> Iterator[None]:
+    """Let messages and errors of the library name the options, by arguments."""
     try:
-        with named_options(**_NAMES):
+        with named_options(**names):
             yield
     except (ParameterError, ConvergenceError) as error:
-        option = _NAMES.get(error.field or "")
+        option = names.get(error.field or "")
         if option is None:
             raise
         said = str(error).removeprefix(error.field or "").removeprefix(" =").removeprefix(":")

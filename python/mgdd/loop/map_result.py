@@ -55,7 +55,7 @@ class Visit(NamedTuple):
     failed: bool
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MapSearch(Result):
     """What `seek_map` has found.
 
@@ -166,7 +166,7 @@ class MapSearch(Result):
     def _rows(self) -> list[Row]:
         cells = self.cells["regret"]
         mean, most = float(cells.mean()), float(cells.max())
-        rows = [Row("expected regret", f"{mean:.3g}, at most {most:.3g} in a cell", "unit of J")]
+        rows = [Row("expected regret", f"mean {mean:.3g}, largest {most:.3g}", "unit of J")]
         if self.seeker.settings["guide"]:
             rows.append(Row("share of the guide", f"{self.seeker.trust:.2f}", "-"))
         return [*rows, *(Row("finding", str(finding), "-") for finding in self.findings)]

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.engine import Cylinder
-from mgdd.errors import DataError, Interrupted, ParameterError, argument
+from mgdd.errors import DataError, Interrupted, ParameterError, argument, hinted
 from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
+from mgdd.loop.lower_limits import both_sides, measured_names, plain_name, with_lower_sides
 from mgdd.loop.map_result import MapSearch, Visit
 from mgdd.loop.plant import Plant
-from mgdd.loop.seek import plant_of, seek_inputs
+from mgdd.loop.seek import plant_of, seek_inputs, started
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.loop.virtual_test_bed import VirtualTestBed
 from mgdd.optimize.map_seeking import MapSeeking, entries_of
@@ -32,6 +32,12 @@ _SETTLING, _AVERAGED = 20, 50  # cycles of a visit on an engine
 _FEWEST = 10  # cycles that tell what a mean is worth
 _KNOWN = 0.5  # of what is not known at a visit: a mean that is surer teaches little more
 _FAILED = 0.5  # share of the cycles of a visit
+# Of an axis, and of the bounds of an input: a cycle that ran farther from its operating point, or from the inputs of
+# the cycle before, as where a guard steps back and tries again, is none of the visit.
+_ELSEWHERE, _MOVED = 0.01, 0.05
+_SETTINGS = (
+    "noise_sd", "averaged", "moving_cost", "memory_readings", "horizon", "kept", "reach", "limit_probability",
+)  # fmt: skip
 _NODES = {1: 41, 2: 17, 3: 11}
 _SURE_FROM = 3  # visits per axis and input: what fewer promise of the regret is too much
 
@@ -47,11 +53,14 @@ class Progress(NamedTuple):
         The last one.
     regret : float
         By how much J of the true best is expected to be above that of the map, mean of the cells [unit of J].
+    settled : int
+        Cells where it is within the tolerance; 0 without one.
     """
 
     visit: int
     last: Visit
     regret: float
+    settled: int
 
 
 def seek_map(
@@ -151,10 +160,7 @@ def seek_map(
     >>> found.findings
     ()
     """
-    if isinstance(visits, bool) or not isinstance(visits, int | np.integer) or visits < 1:
-        raise ParameterError.of("visits", visits, "a whole number >= 1")
-    if tolerance is not None and not tolerance > 0.0:
-        raise ParameterError.of("tolerance", tolerance, "> 0, in the unit of J")
+    require_end(visits, tolerance)
     sides = both_sides(limits) if seeker is None else tuple(seeker.settings["limits"])
     sought = seek_inputs(inputs) if seeker is None else tuple(seeker.settings["inputs"])
     entries = entries_of(axes, [one.name for one in sought]) if seeker is None else seeker.axes
@@ -162,17 +168,16 @@ def seek_map(
         plant = bed_of(plant, list(entries), measured_names(sides))
     whole = [*_as_inputs(entries), *sought]
     driven = plant_of(plant, whole, sides)
-    dwell = _dwell(plant, averaged, settling)
+    dwell = dwell_of(averaged, settling, on_plant=isinstance(plant, Plant))
+    if isinstance(driven, VirtualTestBed):
+        driven.require_cells(entries)
     if seeker is None:
-        own = dict(settings or {})
         if isinstance(driven, VirtualTestBed) and _is_engine(guide):
             cylinder = cylinder_of(getattr(guide, "cylinder", guide))
             guide, limit_guides = model_of(driven, cylinder, entries, sought, [limit.name for limit in sides])
-        own.setdefault("averaged", float(dwell.most))
-        own.setdefault("moving_cost", dwell.settling / max(dwell.most, 1))
-        seeker = MapSeeking(
-            inputs, entries, limits=sides, guide=guide, limit_guides=limit_guides, start=start, maximize=maximize,
-            seed=seed, **own,
+        seeker = map_seeker(
+            inputs, entries, dwell, settings or {}, limits=sides, guide=guide, limit_guides=limit_guides,
+            start=started(start, sought), maximize=maximize, seed=seed,
         )  # fmt: skip
     return _searched(with_lower_sides(driven, sides), seeker, dwell, visits, tolerance, record, on_visit)
 
@@ -184,6 +189,14 @@ def _is_engine(guide: Any) -> bool:
     )
 
 
+def require_end(visits: int, tolerance: float | None) -> None:
+    """ParameterError for what ends no search."""
+    if isinstance(visits, bool) or not isinstance(visits, int | np.integer) or visits < 1:
+        raise ParameterError.of("visits", visits, "a whole number >= 1")
+    if tolerance is not None and not tolerance > 0.0:
+        raise ParameterError.of("tolerance", tolerance, "> 0, in the unit of J")
+
+
 class Dwell(NamedTuple):
     """Cycles of a visit: those before the others, and how many are averaged at least and at most."""
 
@@ -192,15 +205,33 @@ class Dwell(NamedTuple):
     most: int
 
 
-def _dwell(plant: Any, averaged: Any, settling: int | None) -> Dwell:
-    real = isinstance(plant, Plant)
-    given = (_AVERAGED if real else 1) if averaged is None else averaged
+def dwell_of(averaged: Any, settling: int | None, *, on_plant: bool) -> Dwell:
+    """Read how long a visit takes; ParameterError for no cycles."""
+    given = (_AVERAGED if on_plant else 1) if averaged is None else averaged
     least, most = given if isinstance(given, tuple) else (given, given)
-    before = (_SETTLING if real else 0) if settling is None else settling
+    before = (_SETTLING if on_plant else 0) if settling is None else settling
     for name, value, low in (("averaged", least, 1), ("averaged", most, least), ("settling", before, 0)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
             raise ParameterError.of(name, given if name == "averaged" else value, f"a whole number of cycles >= {low}")
     return Dwell(int(before), int(least), int(most))
+
+
+def map_seeker(
+    inputs: Any, axes: Mapping[str, ArrayLike], dwell: Dwell, settings: Mapping[str, Any], **given: Any
+) -> MapSeeking:
+    """Make the seeker of visits of that length, with further settings; ParameterError that names one as such."""
+    for name in settings:
+        if name not in _SETTINGS:
+            raise ParameterError(
+                hinted(f"{argument('settings')}: {name!r}: must be one of {', '.join(_SETTINGS)}", name, _SETTINGS)
+            )
+    own = {"averaged": float(dwell.most), "moving_cost": dwell.settling / dwell.most}
+    try:
+        return MapSeeking(inputs, axes, **given, **{**own, **settings})
+    except ParameterError as error:
+        if error.field not in settings:
+            raise
+        raise error.reworded(f"{argument('settings')}: {error}") from error
 
 
 def _as_inputs(axes: Mapping[str, ArrayLike]) -> list[Input]:
@@ -226,6 +257,8 @@ def model_of(
     """Give J and limits of a model over axes and inputs, from the same test bed with that cylinder."""
     import xarray as xr
 
+    if "cov_imep_percent" in [plain_name(name)[0] for name in limits]:
+        raise ParameterError(f"{argument('limits')}: cov_imep_percent has no steady value for the guide: leave it out")
     nodes = {name: np.asarray(entries, np.float64) for name, entries in axes.items()}
     nodes |= {one.name: np.linspace(one.lower, one.upper, _NODES.get(len(inputs), 7)) for one in inputs}
     grid = dict(zip(nodes, np.meshgrid(*nodes.values(), indexing="ij"), strict=True))
@@ -259,12 +292,12 @@ def _searched(
     if file is not None:
         for row in file.replayed(seeker):
             made.append(row)
-        if made and hasattr(plant, "visit"):
-            plant.visit = len(made)
     fewest = _SURE_FROM * (len(seeker.axes) + len(seeker.input_names))
     try:
         while seeker.readings < visits:
             suggestion = seeker.suggest()
+            if hasattr(plant, "begin"):
+                plant.begin(len(made))
             visit = _visited(plant, seeker, dwell, suggestion.at, suggestion.inputs, suggestion.sd)
             _tell(seeker, visit)
             made.append(visit)
@@ -274,7 +307,8 @@ def _searched(
                 cells = seeker.cells()["regret"].to_numpy()
                 regret = float(cells.max()) if np.isfinite(cells).all() else math.inf
                 if on_visit is not None:
-                    on_visit(Progress(len(made), visit, float(cells.mean())))
+                    settled = 0 if tolerance is None else int((cells <= tolerance).sum())
+                    on_visit(Progress(len(made), visit, float(cells.mean()), settled))
                 if tolerance is not None and len(made) >= fewest and regret <= tolerance:
                     break
     except KeyboardInterrupt:
@@ -293,15 +327,19 @@ def _visited(
     plant: Plant, seeker: MapSeeking, dwell: Dwell, at: dict[str, float], inputs: dict[str, float], sd: float
 ) -> Visit:
     """Drive to a point, wait, and average; a visit at which half of the cycles fail has failed."""
-    plant.apply({**at, **inputs})
     names = seeker.limit_names
+    near = {name: _ELSEWHERE * float(np.ptp(entries)) for name, entries in seeker.axes.items()}
+    near |= {one.name: _MOVED * (one.upper - one.lower) for one in seeker.settings["inputs"]}
+    ran = dict(inputs)
     rows, failed = list[list[float]](), 0
     applied = {name: list[float]() for name in inputs}
     for cycle in range(dwell.settling + dwell.most):
+        plant.apply({**at, **inputs})  # in every cycle: a guard moves by steps, a bus waits for the next command
         measured = plant.measure()
+        before, ran = {**ran, **at}, {**at, **inputs, **measured.applied}
         if cycle < dwell.settling:
             continue
-        if measured.misfire:
+        if measured.misfire or any(abs(ran[name] - before[name]) > width for name, width in near.items()):
             failed += 1
         else:
             row = [measured.performance, *(float(measured.limits[name]) for name in names)]
@@ -311,7 +349,7 @@ def _visited(
                 raise DataError(f"the plant read {listed} at {where}: must be finite, or a misfire")
             rows.append(row)
             for name in inputs:
-                applied[name].append(float(measured.applied.get(name, inputs[name])))
+                applied[name].append(float(ran[name]))
         counted = len(rows) + failed
         if len(rows) >= _FEWEST and dwell.least <= counted < dwell.most:
             mean_sd = float(np.std([row[0] for row in rows], ddof=1)) / math.sqrt(len(rows))

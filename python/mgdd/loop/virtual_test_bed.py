@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from mgdd._core.engine import OperatingPoint
-from mgdd.errors import ParameterError, RigError, hinted
+from mgdd.errors import ParameterError, RigError, argument, hinted
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
@@ -23,7 +24,7 @@ _SEEDS = 1_000_003  # operating points of one test bed
 
 
 class VirtualTestBed:
-    """A virtual engine whose operating point is an input like the others: a plant for `mgdd.maps.seek_map`.
+    """A virtual engine whose operating point is an input like the others: a plant for `mgdd.loop.seek_map`.
 
     Parameters
     ----------
@@ -71,14 +72,16 @@ class VirtualTestBed:
         known = list(OperatingPoint().to_dict())
         for name in self._axes:
             if name not in known:
-                raise ParameterError(hinted(f"axes: {name!r} is no number of an operating point", name, known))
+                raise ParameterError(
+                    hinted(f"{argument('axes')}: {name!r} is no number of an operating point", name, known)
+                )
         self._point = point if callable(point) else None
         given = None if callable(point) else point
         self._cylinder, self._base = engine_of(cylinder, {} if given is None else given)
         first = VirtualEngine(self._cylinder, self._base, limits=limits, seed=seed, **settings)
         self.limit_names = first.limit_names
         self.input_names = (*self._axes, *first.input_names)
-        self.visit = 0  # changes of the operating point so far, that the noise of the next one follows from
+        self._visit = 0  # changes of the operating point so far, that the noise of the next one follows from
         self._at: tuple[float, ...] | None = None
         self._bench: VirtualEngine | None = None
         self._wanted: tuple[float, ...] | None = None
@@ -95,6 +98,16 @@ class VirtualTestBed:
         own = {name: float(numbers[name]) for name in self._axes}
         return self._point(**own) if self._point else self._base.replace(**own)
 
+    def require_cells(self, axes: Mapping[str, ArrayLike]) -> None:
+        """ParameterError where the engine does not run in some cell of these axes."""
+        for numbers in itertools.product(*(np.asarray(column, np.float64).tolist() for column in axes.values())):
+            at = dict(zip(axes, numbers, strict=True))
+            try:
+                VirtualEngine(self._cylinder, self.point_at(at), **self._settings)
+            except ParameterError as error:
+                where = ", ".join(f"{name} = {value:g}" for name, value in at.items())
+                raise ParameterError(f"{argument('axes')} at {where}: {error}") from error
+
     @property
     def operating_point_changes(self) -> bool:
         """Whether the next cycle runs at another operating point than the last one."""
@@ -104,6 +117,10 @@ class VirtualTestBed:
         """Set operating point and inputs of the next cycle, all of `input_names`."""
         self._wanted = checked_inputs(inputs, self.input_names)
 
+    def begin(self, visit: int) -> None:
+        """Say that a visit with this number begins: its noise is that of this number, whatever ran before."""
+        self._visit, self._bench = visit, None
+
     def measure(self) -> Measurement:
         """Run one cycle at the point and the inputs applied last."""
         if self._wanted is None:
@@ -112,9 +129,9 @@ class VirtualTestBed:
         if self._bench is None or self.operating_point_changes:
             self._at = self._wanted[:own]
             point = self.point_at(dict(zip(self._axes, self._at, strict=True)))
-            seed = (self._seed * _SEEDS + self.visit) % 2**64
+            seed = (self._seed * _SEEDS + self._visit) % 2**64
             self._bench = VirtualEngine(self._cylinder, point, limits=self.limit_names, seed=seed, **self._settings)
-            self.visit += 1
+            self._visit += 1
         inputs = dict(zip(self.input_names[own:], self._wanted[own:], strict=True))
         self._bench.apply(inputs)
         measured = self._bench.measure()

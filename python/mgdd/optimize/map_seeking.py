@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.io.files import write_whole_text
 from mgdd.optimize.inputs import inputs_of, named_values, unit_of_input
 from mgdd.optimize.optimum import limits_of
@@ -104,7 +104,7 @@ class MapSeeking(_core.optimize.MapSeeking):
 
     See Also
     --------
-    mgdd.maps.seek_map : the whole search on a plant.
+    mgdd.loop.seek_map : the whole search on a plant.
 
     References
     ----------
@@ -432,13 +432,17 @@ def nearest_cell(axes: Mapping[str, ArrayLike], at: Mapping[str, float]) -> tupl
 def entries_of(axes: Any, inputs: Sequence[str]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
     """Read the axes of a map, two entries at least, none of them called as an input."""
     if not isinstance(axes, Mapping) or not axes:
-        raise ParameterError.of("axes", axes, "names with their entries, for example {'fuel_mg': [6, 20, 40]}")
+        raise ParameterError.of(
+            argument("axes"), axes, "names with their entries, for example {'fuel_mg': [6, 20, 40]}"
+        )
     out = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in axes.items()}
     for name, column in out.items():
         if column.size < 2 or not np.isfinite(column).all() or not (np.diff(column) > 0.0).all():
-            raise ParameterError.of(f"axes of {name}", column.tolist(), "two entries at least, finite, increasing")
+            raise ParameterError.of(
+                f"{argument('axes')} of {name}", column.tolist(), "two entries at least, finite, increasing"
+            )
     if twice := [name for name in inputs if name in out]:
-        raise ParameterError(f"inputs: {', '.join(twice)} is an axis too: name it in one of them")
+        raise ParameterError(f"{argument('inputs')}: {', '.join(twice)} is an axis too: name it in one of them")
     return out
 
 

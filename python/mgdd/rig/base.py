@@ -60,6 +60,11 @@ class AroundPlant:
         """Operating point of the next cycle, for a guide; as absent as the plant's own."""
         return getattr(self.plant, "point")  # noqa: B009 - the protocol of a plant does not have it
 
+    def begin(self, visit: int) -> None:
+        """Say that a visit of a search for a map begins, to a plant whose noise follows from its number."""
+        if hasattr(self.plant, "begin"):
+            self.plant.begin(visit)
+
 
 class OpenOnce:
     """Open until it is closed, and then never again."""

@@ -18,7 +18,10 @@ GUESSES = """
 simulate -> mgdd engine simulate or mgdd throttle simulate
 analyze p.csv = engine analyze
 check -> mgdd engine check or mgdd rig check
-seek = engine seek
+seek -> mgdd engine seek or mgdd map seek
+seek map --over speed_rpm=1000:2000:3 = map seek
+map search --over speed_rpm=1000:2000:3 = map seek
+map seek --cycles 9 -> '--visits'
 calibrate a.csv = engine calibrate
 sweep -o x.csv -> as in mgdd engine sweep --over
 sweep --over soc_cad=-9:3:5 -o x.csv = engine sweep

@@ -229,7 +229,8 @@ def test_a_test_bed_steers_the_point_and_says_what_is_steady() -> None:
         ({"guide": None}, ParameterError, "limit_guides"),
         ({"guide": lambda x: 1.0 / (x["speed_rpm"] - 2000.0)}, ParameterError, "speed_rpm = 2000"),
         ({"guide": lambda x: math.nan if x["load"] > 0.8 else 1.0}, ParameterError, "load = 0.9"),
-        ({"settings": {"reach": 7.0}}, ParameterError, "reach"),
+        ({"settings": {"reach": 7.0}}, ParameterError, "settings: reach"),
+        ({"settings": {"seed": 7}}, ParameterError, "settings: 'seed': must be one of"),
     ],
 )  # fmt: skip
 def test_bad_input_is_refused_by_name_before_a_visit(changes: dict[str, Any], error: type, text: str) -> None:

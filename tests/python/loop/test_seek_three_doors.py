@@ -11,8 +11,9 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.engine import Cylinder
-from mgdd.loop import EngineGuide, VirtualEngine, seek
+from mgdd.loop import EngineGuide, VirtualEngine, seek, seek_map
 from mgdd.loop.summary import FIGURES_OF_INPUT
+from mgdd.maps import read_map
 from mgdd.results.labels import to_jsonable
 from mgdd.rig import Experiment, run_experiment
 
@@ -171,3 +172,43 @@ def test_gains_do_not_come_from_the_truth_of_the_plant() -> None:
     for seeker in ("auto", "extremum_seeking", "spsa", "gradient_descent"):
         found = seek(Closed(seed=2), {"soc_cad": (-20.0, 5.0)}, seeker=seeker, cycles=600)
         assert abs(found.inputs["soc_cad"] + 5.63) < 2.5, seeker
+
+
+MAPS: dict[str, tuple[dict[str, Any], list[str], str]] = {
+    "a model and limits on both sides": (
+        {"guide": True, "limits": {"p_max_bar": (60.0, 120.0)}, "settling": 10, "averaged": 20},
+        "--limit p_max_bar=60:120 --guide model --guide-set wall_heat_scale=0.8 --settling 10 --averaged 20".split(),
+        ROUGH % "model" + "settling = 10\naveraged = 20\nlimits.p_max_bar = [60, 120]\n",
+    ),
+    "a start and a tolerance": (
+        {"start": {"soc_cad": 2.0}, "tolerance": 0.3},
+        "--start soc_cad=2 --tolerance 0.3".split(),
+        "start.soc_cad = 2\ntolerance = 0.3\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("question", MAPS)
+def test_three_doors_seek_the_same_map(question: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    asked, options, table = MAPS[question]
+    axes = {"speed_rpm": [1200.0, 1800.0, 2400.0], "fuel_mg": [12.0, 28.0]}
+    guide = Cylinder(wall_heat_scale=1.6 * Cylinder().wall_heat_scale) if "guide" in asked else None
+    seen = list[Any]()
+    found = seek_map(
+        VirtualEngine(seed=3), {"soc_cad": (-20.0, 5.0)}, axes, visits=5, seed=3, on_visit=seen.append,
+        **{**asked, "guide": guide},
+    )  # fmt: skip
+    assert seen[-1].regret == found.regret
+    assert seen[-1].settled == ((found.cells["regret"] <= asked["tolerance"]).sum() if "tolerance" in asked else 0)
+
+    file = tmp_path / "map.nc"
+    over = ["--over", "speed_rpm=1200:2400:3", "--over", "fuel_mg=12,28", "--input", "soc_cad=-20:5", "--visits", "5"]
+    assert main(["map", "seek", *over, *options, "--seed", "3", "--json", "--quiet", "-o", str(file)]) == 0
+    by_command, own = json.loads(capsys.readouterr().out), to_jsonable(found.to_dict())
+    assert {name: by_command[name] for name in own} == own
+    assert read_map(file) == found.map
+
+    entries = "inputs.soc_cad = [-20, 5]\naxes.speed_rpm = [1200, 1800, 2400]\naxes.fuel_mg = [12, 28]\nvisits = 5\n"
+    head = HEAD.format(seed=3).replace("seek", "map")
+    by_experiment = run_experiment(Experiment.from_toml(head + entries + table))
+    assert by_experiment.dataset.identical(found.dataset)

@@ -9,24 +9,26 @@ from typing import Any, NamedTuple
 
 from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.io.files import existing_file
-from mgdd.loop import Plant, VirtualEngine, VirtualThrottle
+from mgdd.loop import Plant, VirtualEngine, VirtualTestBed, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.results.describe import described
 from mgdd.rig.can.can_rig import BUS_MODES
 from mgdd.rig.can.signal_map import SignalMap, loop_messages
 from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.experiment.engine_tasks import MapPlan, SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import (
     SAMPLE_S,
     EnginePlant,
     IdentifyTask,
+    MapTask,
     SafetySettings,
     SeekTask,
     TrackTask,
     beside,
     scaled,
 )
-from mgdd.rig.experiment.tasks import IdentifyPlan, SeekPlan, TrackPlan, engine_named, throttle_named
+from mgdd.rig.experiment.tasks import IdentifyPlan, TrackPlan, throttle_named
 from mgdd.rig.recorded import RecordedRun, readable_record
 from mgdd.rig.safety import SafetyEnvelope
 
@@ -83,7 +85,7 @@ class CheckedExperiment:
     """An experiment with all that it names."""
 
     experiment: Experiment
-    plan: IdentifyPlan | TrackPlan | SeekPlan  # what will be done, made with its models
+    plan: IdentifyPlan | TrackPlan | SeekPlan | MapPlan  # what will be done, made with its models
     sample_s: float | None  # between samples of a throttle
     envelope: SafetyEnvelope | None  # of a throttle
     signal_map: SignalMap | None  # of a mode with a bus
@@ -143,14 +145,15 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
 def _checked(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
     _require_acting(experiment)
-    map_name = experiment.bus.map or ("engine" if experiment.task == "seek" else "etb")
+    map_name = experiment.bus.map or ("engine" if isinstance(experiment.plant, EnginePlant) else "etb")
     signal_map = SignalMap.load(beside(experiment.folder, map_name)) if mode in BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
     recorded = None if record is None else readable_record(record)
-    plan: IdentifyPlan | TrackPlan | SeekPlan
-    if isinstance(settings, SeekTask):
-        plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder, seed=experiment.seed), None, None
+    plan: IdentifyPlan | TrackPlan | SeekPlan | MapPlan
+    if isinstance(settings, SeekTask | MapTask):
+        make: Any = SeekPlan if isinstance(settings, SeekTask) else MapPlan
+        plan, sample_s, envelope = make(settings, folder=experiment.folder, seed=experiment.seed), None, None
     else:
         # Over a bus the DBC of the recorded run gave the time between its samples.
         recorded_s = None if recorded is None else recorded.config.get("sample_s")
@@ -238,16 +241,21 @@ def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: S
     plant, folder = experiment.plant, experiment.folder
     if isinstance(plant, EnginePlant):
         engine, steered = engine_named(plant.preset, folder), getattr(experiment.settings, "inputs", ("soc_cad",))
+        cylinder = scaled(engine.cylinder, plant.scale, "plant")
+        how: dict[str, Any] = {
+            "limits": experiment.limit_names, "inputs": list(steered), "soc_scatter_cad": plant.soc_scatter_cad,
+            "efficiency_noise_percent": plant.efficiency_noise_percent, "seed": experiment.seed,
+        }  # fmt: skip
         try:
-            return VirtualEngine(
-                scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
-                inputs=list(steered), soc_scatter_cad=plant.soc_scatter_cad,
-                efficiency_noise_percent=plant.efficiency_noise_percent, seed=experiment.seed,
-            )  # fmt: skip
+            if isinstance(experiment.settings, MapTask):
+                bed = VirtualTestBed(cylinder, list(experiment.settings.axes), point=engine.point, **how)
+                bed.require_cells(experiment.settings.axes)
+                return bed
+            return VirtualEngine(cylinder, engine.point, **how)
         except ParameterError as error:
             if error.field not in ("inputs", "limits"):
                 raise
-            table = "safety" if error.value in experiment.safety.limits else "seek"
+            table = "safety" if error.value in experiment.safety.limits else experiment.task
             raise error.reworded(f"{table}.{error}") from error
     return VirtualThrottle(
         scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
@@ -258,8 +266,8 @@ def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: S
 def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:
     """Refuse a map without what the task applies and measures."""
     experiment = checked.experiment
-    seeks = experiment.task == "seek"
-    inputs = tuple(experiment.settings.inputs) if isinstance(experiment.settings, SeekTask) else ("duty",)
+    seeks = isinstance(checked.plan, SeekPlan | MapPlan)
+    inputs = tuple(checked.plan.start) if isinstance(checked.plan, SeekPlan | MapPlan) else ("duty",)
     needed = experiment.limit_names if seeks else ("sensed_angle_deg", "first_v", "second_v")
     if signal_map.input_names != inputs:
         raise ParameterError.of(
@@ -272,7 +280,9 @@ def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:
             f"completed by {', '.join(missing)}: so task = {experiment.task!r} calls what it measures; map them",
         )  # fmt: skip
     if seeks and not signal_map.objective:
-        raise DataError(f"{signal_map.file}: [[objective]] is missing: task = 'seek' needs a value and its weight")
+        raise DataError(
+            f"{signal_map.file}: [[objective]] is missing: task = {experiment.task!r} needs a value and its weight"
+        )
     if experiment.mode == "hil" and experiment.bus.connection is None and signal_map.state is not None:
         try:
             signal_map.state.codes()

@@ -19,6 +19,7 @@ from mgdd.rig.experiment.settings import (
     BusSettings,
     EnginePlant,
     IdentifyTask,
+    MapTask,
     ReplaySettings,
     SafetySettings,
     SeekTask,
@@ -28,8 +29,8 @@ from mgdd.rig.experiment.settings import (
 )
 
 _KIND, _FORMAT = "experiment", 1
-_TASK_OF: Mapping[str, type[IdentifyTask | TrackTask | SeekTask]] = {
-    "identify": IdentifyTask, "track": TrackTask, "seek": SeekTask,
+_TASK_OF: Mapping[str, type[IdentifyTask | TrackTask | SeekTask | MapTask]] = {
+    "identify": IdentifyTask, "track": TrackTask, "seek": SeekTask, "map": MapTask,
 }  # fmt: skip
 # Keys that may name a file, in the records of an experiment.
 _FILES = {
@@ -45,7 +46,7 @@ class Experiment:
 
     Parameters
     ----------
-    task : {"identify", "track", "seek"}
+    task : {"identify", "track", "seek", "map"}
         What is done.
     mode : {"simulate", "hil", "dry_run", "replay", "bench"}
         Where: in this process; in another process behind a bus; on a real bus, transmitting nothing; on a record; on a
@@ -60,7 +61,7 @@ class Experiment:
         What no controller and no seeker may exceed.
     replay : ReplaySettings
         The record to replay.
-    settings : IdentifyTask, TrackTask or SeekTask
+    settings : IdentifyTask, TrackTask, SeekTask or MapTask
         Of the task.
     origin : str
         The file, for messages; not compared.
@@ -83,7 +84,7 @@ class Experiment:
     """
 
     task: str
-    settings: IdentifyTask | TrackTask | SeekTask
+    settings: IdentifyTask | TrackTask | SeekTask | MapTask
     plant: ThrottlePlant | EnginePlant
     mode: str = "simulate"
     seed: int = 0
@@ -124,7 +125,7 @@ class Experiment:
             mode=mode,
             seed=seed,
             settings=_TASK_OF[task].read(table.table(task)),
-            plant=(EnginePlant if task == "seek" else ThrottlePlant).read(table.table("plant")),
+            plant=(EnginePlant if task in ("seek", "map") else ThrottlePlant).read(table.table("plant")),
             bus=BusSettings.read(table.table("bus")),
             safety=SafetySettings.read(table.table("safety")),
             replay=ReplaySettings.read(table.table("replay")),
@@ -187,7 +188,7 @@ class Experiment:
     @property
     def limit_names(self) -> tuple[str, ...]:
         """Limited quantities that seeker and guard ask for."""
-        own = self.settings.limits if isinstance(self.settings, SeekTask) else {}
+        own = getattr(self.settings, "limits", {})
         return tuple(dict.fromkeys((*own, *self.safety.limits)))
 
 

@@ -28,9 +28,11 @@ from mgdd.results.result import Result
 from mgdd.rig.experiment.checked import CheckedExperiment, LoopChoice, check_experiment
 from mgdd.rig.experiment.core_samples import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
+from mgdd.rig.experiment.engine_tasks import MapPlan, SeekPlan
 from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.settings import MapTask
 from mgdd.rig.experiment.stand import Cycle, RunRecord, Stand, Watched, guarded, opened_rig
-from mgdd.rig.experiment.tasks import Outcome, SeekPlan, TrackPlan
+from mgdd.rig.experiment.tasks import Outcome, TrackPlan
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -146,8 +148,10 @@ class ExperimentResult(Result):
         return rows_of({**self.figures, "folder": str(self.folder)})
 
     def _draw(self, ax: Axes | None) -> Axes:
-        from mgdd.plot import seeking, throttle_run
+        from mgdd.plot import map_cells, seeking, throttle_run
 
+        if isinstance(self.experiment.settings, MapTask):
+            return map_cells(self.dataset, next(iter(self.experiment.settings.inputs)), ax=ax)
         return (seeking if "cycle" in self.dataset.dims else throttle_run)(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
@@ -296,7 +300,7 @@ def _run(
 ) -> tuple[Outcome, dict[str, Any]]:
     def listen_here(cycle: Cycle) -> None:
         record.say(stand.events())
-        if isinstance(checked.plan, SeekPlan) and record.recorder is not None:
+        if isinstance(checked.plan, SeekPlan | MapPlan) and record.recorder is not None:
             record.recorder.sample("seeker", checked.plan.estimate())
         listen(cycle)
 
@@ -324,8 +328,11 @@ def _timing(times: tuple[array[float], array[float]], elapsed_s: float) -> dict[
 def _keep(run: RunFolder, outcome: Outcome, result: ExperimentResult) -> None:
     run.json("timing.json", result.timing)
     run.dataset("signals.nc", outcome.dataset)
-    for name, text in outcome.files.items():
-        run.text(name, text)
+    for name, content in outcome.files.items():
+        if isinstance(content, str):
+            run.text(name, content)
+        else:
+            run.dataset(name, content)
     run.json("result.json", result.to_dict())
     for name, draw in outcome.drawings.items():
         run.figure(f"{name}.png", draw())

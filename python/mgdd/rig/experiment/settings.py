@@ -20,7 +20,7 @@ from mgdd.rig.can.toml_table import TomlTable
 
 PACES = ("step", "real_time")
 LOOPS = ("auto", "core", "python")
-TASKS = ("identify", "track", "seek")
+TASKS = ("identify", "track", "seek", "map")
 SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
 _BOUNDS_CAD = {"soc_cad": (-30.0, 10.0)}  # of a search, by default; as of `mgdd engine seek`
 _T = TypeVar("_T")
@@ -106,7 +106,16 @@ def _numbers(table: TomlTable) -> dict[str, float]:
     return {name: float(value) for name, value in items.items()}
 
 
-_TABLES = {"scales": _numbers, "bounds": _bounds, "limits": _limits, "any": TomlTable.items}
+def _axes(table: TomlTable) -> dict[str, list[float]]:
+    """Take entries of the axes of a map; how many and their order is asked where the search is made."""
+    items = table.items()
+    for name, value in items.items():
+        if not (fits(value, "numbers") and value):
+            raise table.error(name, value, "a list of numbers, for example [1000, 1500, 2000]")
+    return {name: [float(one) for one in value] for name, value in items.items()}
+
+
+_TABLES = {"axes": _axes, "scales": _numbers, "bounds": _bounds, "limits": _limits, "any": TomlTable.items}
 
 
 def _require(table: TomlTable, name: str, value: Any, facts: Mapping[str, Any]) -> None:
@@ -208,6 +217,26 @@ class SeekTask(Settings):
     limits: Mapping[str, Any] = _key("limits", {})
     settings: Mapping[str, Any] = _key("any", {})
     known: str | None = _key("text")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapTask(Settings):
+    """Let `mgdd.loop.seek_map` seek a map."""
+
+    guide: str = _key("text", "none", among=("none", "model"))
+    model: str = _key("text", "puma_single")
+    scale: Mapping[str, float] = _key("scales", {})
+    axes: Mapping[str, list[float]] = _key("axes", {})
+    inputs: Mapping[str, tuple[float, ...]] = field(
+        default_factory=lambda: dict(_BOUNDS_CAD), metadata={"form": "bounds"}
+    )
+    start: Mapping[str, float] = _key("scales", {})
+    limits: Mapping[str, Any] = _key("limits", {})
+    visits: int = _key("integer", 32, low=1, high=10_000)
+    tolerance: float | None = _key("number", low=0.0)
+    averaged: int | None = _key("integer", low=1, high=10_000)
+    settling: int | None = _key("integer", low=0, high=10_000)
+    settings: Mapping[str, Any] = _key("any", {})
 
 
 def beside(folder: Path, name: str) -> Path | str:

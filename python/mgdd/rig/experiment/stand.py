@@ -23,7 +23,8 @@ from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import Bus, CanTransport
 from mgdd.rig.exchange import TABLE, RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
-from mgdd.rig.experiment.tasks import SeekPlan, compared
+from mgdd.rig.experiment.engine_tasks import MapPlan, SeekPlan
+from mgdd.rig.experiment.tasks import compared
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import GatedThrottle, SafetyGate, said_of
 
@@ -193,12 +194,12 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
             left=left,
         )
     plan, safety = checked.plan, checked.experiment.safety
-    if not isinstance(plan, SeekPlan):
+    if not isinstance(plan, SeekPlan | MapPlan):
         raise TypeError(f"{type(plan).__name__} without an envelope")
     guard = ActuatorGuard(
         recorded,
         start=plan.start,
-        bounds={name: (low, high) for name, (low, high, *_) in plan.task.inputs.items()},
+        bounds=plan.bounds,
         rates={"soc_cad": safety.rate_cad, **safety.rates} if "soc_cad" in plan.start else safety.rates,
         limits=[Limit(name, upper) for name, upper in safety.limits.items()],
     )

@@ -1,4 +1,4 @@
-"""Identify, track and seek on any plant with the right inputs: simulated, behind a bus, or recorded."""
+"""Identify and track on any throttle with the right inputs: simulated, behind a bus, or recorded."""
 
 from __future__ import annotations
 
@@ -12,24 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core, identify, presets
-from mgdd.errors import Error, Interrupted, ParameterError, arguments_written
+from mgdd.errors import ParameterError
 from mgdd.io import throttle_log
-from mgdd.io.point_table import read_points
 from mgdd.loop import Plant, Reference
-from mgdd.loop.closed_loop import stillness
 from mgdd.loop.controller_families import groups_of
-from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.lower_limits import both_sides
-from mgdd.loop.seek import require_cycles, searched, seek_inputs, started, tell_known
-from mgdd.loop.seek_choice import Choice, Question, chosen
-from mgdd.loop.seek_result import SeekResult
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.results.labels import labelled_dataset
-from mgdd.rig.experiment.settings import IdentifyTask, SeekTask, TrackTask, beside, scaled
+from mgdd.rig.experiment.settings import IdentifyTask, TrackTask, beside
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.loop.track import AngleController
-    from mgdd.presets.preset import Preset
     from mgdd.throttle import Throttle
 
 _OF_THE_DUTY = "total_variation"  # the one figure that no angle enters
@@ -51,7 +43,7 @@ class Outcome:
     figures: Mapping[str, Any]  # numbers and short texts, as JSON holds them
     dataset: xr.Dataset
     interrupted: bool = False  # whether Ctrl-C cut it
-    files: Mapping[str, str] = field(default_factory=dict)  # further texts by file name, as a fitted model
+    files: Mapping[str, str | xr.Dataset] = field(default_factory=dict)  # by file name, as a fitted model
     drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # by file name without ending
 
 
@@ -105,7 +97,7 @@ class TrackPlan:
         def duty_at(sample: int, measured_deg: float) -> float:
             return float(controller.step(float(reference_deg[sample]), measured_deg))
 
-        columns, interrupted = _drive(plant, _fewer(self.samples, most), duty_at, first_angle_deg)
+        columns, interrupted = _drive(plant, fewer(self.samples, most), duty_at, first_angle_deg)
         return self.outcome(columns, interrupted=interrupted)
 
     def outcome(self, columns: dict[str, NDArray[np.float64]], *, interrupted: bool) -> Outcome:
@@ -158,7 +150,7 @@ class IdentifyPlan:
 
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many samples, and fit."""
-        samples = _fewer(self.samples, most)
+        samples = fewer(self.samples, most)
         columns, interrupted = _drive(plant, samples, lambda sample, _: float(self.duty[sample]), first_angle_deg)
         dataset = _dataset(columns, self.sample_s, {}, {})
         figures: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
@@ -183,7 +175,8 @@ class IdentifyPlan:
         )
 
 
-def _fewer(samples: int, most: int | None) -> int:
+def fewer(samples: int, most: int | None) -> int:
+    """Give the samples of a task, at most so many."""
     return samples if most is None else min(samples, most)
 
 
@@ -245,86 +238,3 @@ def _draw_fit(validation: Any) -> Figure:
     for pane, what in zip(figure.subplots(1, 3), ("free_run", "n_step", "residuals"), strict=True):
         validation.plot(what, ax=pane)
     return figure
-
-
-def engine_named(name: str, folder: Path) -> Preset:
-    """Load the engine of a preset or of a TOML file."""
-    return presets.load(beside(folder, name), kind="engine")
-
-
-class SeekPlan:
-    """A search, made and checked before anything moves."""
-
-    def __init__(self, task: SeekTask, *, folder: Path, seed: int) -> None:
-        self.task = task
-        try:
-            with arguments_written(_key):
-                self._prepare(task, folder, seed)
-        except ParameterError as error:
-            if error.field not in task.__dataclass_fields__:
-                raise
-            raise error.reworded(f"seek.{error}") from error
-
-    def _prepare(self, task: SeekTask, folder: Path, seed: int) -> None:
-        try:
-            engine = engine_named(task.model, folder)
-        except Error as error:
-            raise error.reworded(f"seek.model = {task.model!r}: {error}") from error
-        guide, cylinder = None, scaled(engine.cylinder, task.scale, "seek")
-        if task.guide != "none":
-            guide = EngineGuide(cylinder=cylinder, kind=task.guide, point=engine.point)
-        inputs = seek_inputs(task.inputs)
-        self._asked = Question(
-            inputs=inputs, start=started(task.start or None, inputs), limits=both_sides(task.limits),
-            noise_sd=task.noise_sd, delay_cycles=task.delay_cycles or 0.0, lag_cycles=task.lag_cycles or 0.0,
-            guide=guide, seed=seed, point=engine.point, settings=dict(task.settings),
-        )  # fmt: skip
-        self._earlier_points = None if task.known is None else read_points(beside(folder, task.known))
-        self._still = stillness(self._asked, task.tolerance or None)
-        choice = self._chosen()
-        self.samples = choice.cycles if task.cycles is None else task.cycles
-        require_cycles(choice, self.samples)
-        self.start = dict(zip(task.inputs, choice.seeker.estimate.tolist(), strict=True))
-
-    def _chosen(self) -> Choice:
-        choice = chosen(self._asked, self.task.seeker)
-        if self._earlier_points is None:
-            return choice
-        return tell_known(self._asked, self.task.seeker, choice, self._earlier_points)[1]
-
-    def estimate(self) -> dict[str, float]:
-        """Give what the running seeker takes for the best inputs, and standard deviations: NaN where it has none."""
-        best = self._running.estimate.tolist()
-        sds = np.broadcast_to(getattr(self._running, "estimate_sd", math.nan), len(best)).tolist()
-        named = zip(self.task.inputs, best, sds, strict=True)
-        return {
-            f"{what}.{name}": own[at] for name, *own in named for at, what in enumerate(("estimate", "estimate_sd"))
-        }
-
-    def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
-        """Run it on a plant, for at most so many cycles."""
-        choice = self._chosen()
-        self._running = choice.seeker
-        try:
-            result = searched(plant, choice, self._asked, _fewer(self.samples, most), self._still)
-        except Interrupted as stop:
-            if not isinstance(stop.partial, SeekResult):
-                raise
-            result = stop.partial
-        return Outcome(
-            figures=result.to_dict() | {"guide": self.task.guide},
-            dataset=result.run.dataset,
-            interrupted=result.interrupted,
-            drawings={"seek": partial(_draw, result.run.dataset)},
-        )
-
-
-def _key(name: str, text: str | None = None) -> str:
-    """Write an argument of the library as the key that sets it."""
-    return f"seek.{name}" if text is None else f"seek.{name} = {text!r}"
-
-
-def _draw(cycles: xr.Dataset) -> Figure:
-    from mgdd import plot
-
-    return drawn(plot.seeking, cycles, size=(8.0, 7.0))

@@ -1,0 +1,129 @@
+"""`mgdd map seek`: one search for a map of the virtual engine."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mgdd._core.loop import bench_inputs, bench_limits
+from mgdd.cli.from_library import Options
+from mgdd.cli.guide_map import add_model, cylinder_of
+from mgdd.cli.map_files import MAP_ENDINGS, shown_map
+from mgdd.cli.options import add_engine, add_over, option, point_given, refuse_idle
+from mgdd.cli.output import check_file, emit, lines, warn
+from mgdd.cli.progress import Stopped
+from mgdd.cli.ranges import grid_of, limits_given, number_pairs
+from mgdd.cli.seek import BENCH_NAMES, add_bench, bench_of, option_names
+from mgdd.errors import Interrupted, ParameterError
+from mgdd.loop.map_result import MapSearch
+from mgdd.loop.seek_map import Progress, seek_map
+from mgdd.maps import write_map
+from mgdd.plot import map_cells
+from mgdd.plot.style import new_figure
+from mgdd.results.labels import to_jsonable
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+
+    from mgdd.maps import CalibrationMap
+
+_SEARCH, _SETTLING = Options(seek_map, "visits", "tolerance"), Options(seek_map, "settling")
+_NAMES = {**BENCH_NAMES, **{name: name for name in ("visits", "settling", "averaged", "record")},
+          "axes": "over", "guide": "guide_set"}  # fmt: skip
+
+
+def _add_seek(parser: Any) -> None:
+    add_over(parser, what="a number of the operating point, an axis of the map,")
+    option(parser, "--input NAME=LOW:HIGH[:STEP] ...",
+           f"bounds of an input of the bench ({', '.join(bench_inputs)}), and the step in which it is set; "
+           "repeatable: a map of each is sought (default: soc_cad=-30:10)")  # fmt: skip
+    option(parser, "--start NAME=X ...",
+           "without --guide: first value of an input, where the limits hold in the middle of the map, repeatable",
+    )  # fmt: skip
+    option(parser, "--limit NAME=X ...",
+           f"keep an indicator, {', '.join(bench_limits)}, below X, or with NAME=LOW:HIGH between two, of which one "
+           "may be left out; repeatable")  # fmt: skip
+    _SEARCH.add(parser)
+    option(parser, "--averaged N[:MOST]",
+           "cycles of a visit that are averaged; with MOST a visit ends between the two, where its mean is surer than "
+           "half of what was not known there (default: 50)")  # fmt: skip
+    _SETTLING.add(parser, settling="20")
+    option(parser, "--record FILE.csv",
+           "write a row per visit; where the file holds some of this search, it goes on behind them")  # fmt: skip
+    option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
+    add_bench(parser, "none", "soft")
+    group = parser.add_argument_group("guide: a rough model of the same bench, which the visits correct")
+    option(group, "--guide", "model: J and limits of a model", default="none", choices=("none", "model"))
+    add_model(group)
+    add_engine(parser)
+
+
+def _seek(args: argparse.Namespace) -> None:
+    check_file("--record", args.record, (".csv",))
+    limits, axes, start = limits_given(args.limit), grid_of(args.over), number_pairs(args.start, "--start")
+    if args.guide == "none":
+        refuse_idle(args, "guide_preset", "guide_set", why="--guide none has no model: give --guide model")
+    else:
+        refuse_idle(args, "start", why="with --guide model the search starts at the best of the model")
+    if not 1 <= len(axes) <= 2:
+        raise ParameterError(f"--over is given {len(axes)} times: a map has one axis or two, as speed_rpm=1000:3000:5")
+    if both := sorted(axes.keys() & point_given(args).keys()):
+        raise ParameterError(f"{both[0]} is an axis, --over, and a number of the point: give one")
+    with option_names(_NAMES):
+        bench, bounds, preset = bench_of(args, limits)
+        if len(bounds) > 1 and Path(args.output or "").suffix in (".nc", ".csv"):
+            raise ParameterError(f"-o {args.output}: {len(bounds)} maps fit into a .dcm or .cdfx only")
+        guide = cylinder_of(args, bench.settings["cylinder"]) if args.guide == "model" else None
+        interrupted = False
+        try:
+            found = seek_map(
+                bench, bounds, axes, limits=limits, guide=guide, start=start or None, averaged=_averaged(args.averaged),
+                record=args.record, on_visit=partial(_say, args), seed=bench.seed,
+                **_SEARCH.given(args), **_SETTLING.given(args),
+            )  # fmt: skip
+        except Interrupted as stop:
+            if not isinstance(stop.partial, MapSearch):
+                raise
+            found, interrupted = stop.partial, True
+            if not found.visits:
+                raise Stopped("no visit was finished, so there is no map") from stop
+    warn(*found.findings)
+    maps = list(found.maps.values())
+    payload = found.to_dict() | {"interrupted": interrupted, "preset": preset, "sensor": args.sensor}
+    payload |= {"seed": bench.seed, "guide": args.guide}
+    text = [*shown_map(args, *maps), "", lines(to_jsonable(payload))]
+    write = dict.fromkeys(MAP_ENDINGS, partial(write_map, maps if len(maps) > 1 else maps[0]))
+    emit(args, payload, text=text, write=write, figure=partial(_drawn, maps))
+    if interrupted:
+        raise Stopped(f"{len(found.visits)} visits are kept")
+
+
+def _say(args: argparse.Namespace, so_far: Progress) -> None:
+    settled = "" if args.tolerance is None else f", {so_far.settled} cells settled"
+    args.progress.expect(_SEARCH.of(args)["visits"])(
+        f"visit {so_far.visit}: expected regret {so_far.regret:.3g}{settled}"
+    )
+
+
+def _averaged(given: str | None) -> int | tuple[int, int] | None:
+    if given is None:
+        return None
+    try:
+        least, *most = map(int, given.split(":"))
+        return (least, *most) if most else least  # type: ignore[return-value]
+    except ValueError:
+        raise ParameterError(f"--averaged {given}: write N or N:MOST, whole numbers of cycles") from None
+
+
+def _drawn(maps: Sequence[CalibrationMap]) -> Figure:
+    figure = new_figure(6.6 * len(maps), 4.6)
+    for place, table in enumerate(maps, 1):
+        map_cells(table, ax=figure.add_subplot(1, len(maps), place))
+    return figure
+
+
+COMMANDS = {"seek": (_add_seek, _seek)}

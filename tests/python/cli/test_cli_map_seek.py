@@ -1,0 +1,81 @@
+"""`mgdd map seek`: Ctrl-C and a record, several inputs, and what is wrong with an option."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from mgdd.cli import main
+from mgdd.maps import read_map
+from typed import Capsys, commands
+
+seek, refused = commands("map", "seek")
+AXES = ("--over", "speed_rpm=1200:2400:3", "--over", "fuel_mg=12,28")
+MODEL = ("--guide", "model", "--guide-set", "wall_heat_scale=1.0", "--limit", "p_max_bar=:120", "--averaged", "10:30")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
+def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path: Path, capsys: Capsys) -> None:
+    record, whole = tmp_path / "visits.csv", tmp_path / "whole.csv"
+    argv = [*AXES, *MODEL, "--record", str(record), "--json", "--quiet"]
+    program = "import sys; from mgdd.cli import main; sys.exit(main(sys.argv[1:]))"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, "map", "seek", *argv, "--visits", "5000"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        while not (record.exists() and record.read_text().count("\n") > 3) and process.poll() is None:
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err.decode()
+    part = json.loads(out)
+    assert part["interrupted"] is True
+    assert f"interrupted: {part['visits']} visits are kept".encode() in err
+    more = ("--visits", str(part["visits"] + 4))
+    again = seek(capsys, *argv[:-2], *more)
+    assert again["visits"] == part["visits"] + 4
+    assert seek(capsys, *AXES, *MODEL, *more, "--record", str(whole))["inputs"] == again["inputs"]
+    assert whole.read_text() == record.read_text()
+
+
+def test_two_inputs_are_two_labels_of_one_file(tmp_path: Path, capsys: Capsys) -> None:
+    file, drawn = tmp_path / "engine.dcm", tmp_path / "maps.png"
+    argv = ["--over", "fuel_mg=12,20,28", "--input", "egr=0:0.3:0.05", "--limit", "nox_soft_ppm=900", "--visits", "6"]
+    assert main(["map", "seek", *argv, *MODEL[:4], "-o", str(file), "--figure", str(drawn)]) == 0
+    out = capsys.readouterr().out
+    assert "CalibrationMap soc_cad" in out
+    assert "CalibrationMap egr" in out
+    assert "keeps the map" not in out
+    assert [read_map(file, name=name).values.size for name in ("soc_cad", "egr")] == [3, 3]
+    assert drawn.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("", "--over is given 0 times: a map has one axis or two"),
+        ("--over speed_rpm=1000:2000", "write NAME=LOW:HIGH:N"),
+        ("--over speed=1:2:2", "--over: 'speed' is no number of an operating point; did you mean 'speed_rpm'"),
+        ("--over speed_rpm=2000,1000", "--over of speed_rpm = [2000.0, 1000.0]: must be two entries at least"),
+        ("--over fuel_mg=0,20", "--over at fuel_mg = 0: "),
+        ("--over speed_rpm=1000,2000 --speed-rpm 900", "speed_rpm is an axis, --over, and a number of the point"),
+        ("--over fuel_mg=9,20 --guide-set wall_heat_scale=1", "--guide-set does not act here; --guide none has no"),
+        ("--over fuel_mg=9,20 --guide model --start soc_cad=1", "--start does not act here; with --guide model"),
+        ("--over fuel_mg=9,20 --start egr=1", "--start has egr: must have one number for each of soc_cad"),
+        ("--over fuel_mg=9,20 --averaged 9:x", "--averaged 9:x: write N or N:MOST"),
+        ("--over fuel_mg=9,20 --settling -1", "--settling -1: must be a whole number of cycles >= 0"),
+        ("--over fuel_mg=9,20 --visits 0", "--visits 0: must be a whole number >= 1"),
+        ("--over fuel_mg=9,20 --limit cov_imep_percent=3 --guide model", "--limit: cov_imep_percent has no steady"),
+        ("--over fuel_mg=9,20 --input egr=0:0.3 -o a.nc", "-o a.nc: 2 maps fit into a .dcm or .cdfx only"),
+        ("--over fuel_mg=9,20 --record none/a.csv", "--record none/a.csv: the folder none does not exist"),
+    ],
+)  # fmt: skip
+def test_a_wrong_option_is_named_with_its_remedy(given: str, said: str, capsys: Capsys) -> None:
+    assert said in refused(capsys, *given.split())
