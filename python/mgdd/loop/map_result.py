@@ -191,7 +191,7 @@ def _maps(seeker: MapSeeking, cells: xr.Dataset, visits: Sequence[Visit]) -> dic
     excess = cells["excess"].to_numpy()
     known: dict[str, Any] = {
         "objective": cells["j"].to_numpy(), "support": counts, "regret": cells["regret"].to_numpy(),
-        "active_limit": _active(cells), "source": np.where(excess > 0.0, "extrapolated", "optimised"),
+        "active_limit": _active(cells), "source": np.where(excess <= 0.0, "optimised", "extrapolated"),
     }  # fmt: skip
     labels = {"regret": ("unit of J", "expected regret")}
     for k, name in enumerate(seeker.limit_names):
@@ -257,7 +257,7 @@ def _doubts(
             text = f"{plain_name(name)[0]} holds every cell back"
             out.append(Finding("limit_everywhere", (plain_name(name)[0],), text, "see whether its value is meant"))
     regret = float(cells["regret"].max())
-    if tolerance is not None and regret > tolerance:
+    if tolerance is not None and not regret <= tolerance:
         text = f"a cell may be short of its best by {regret:.3g}, more than {tolerance:g}"
         out.append(Finding("not_converged", (), text, "take more visits"))
     if seeker.settings["guide"] and seeker.trust < _NOTHING:

@@ -294,7 +294,7 @@ class MapSeeking(_core.optimize.MapSeeking):
         texts = ("objective", "standard deviation of the objective", "expected regret")
         for place, (name, text) in enumerate(zip(("j", "j_sd", "regret"), texts, strict=True), start=3):
             variables[name] = (tuple(axes), np.reshape([row[place] for row in rows], shape), "unit of J", text)
-        excess = np.reshape([row[6] for row in rows], shape) if held else np.full(shape, -1.0)
+        excess = np.maximum(np.reshape([row[6] for row in rows], shape), -1.0)  # without limits far below it
         variables["excess"] = (tuple(axes), excess, "-", "excess over the worst limit, share of it")
         if held:
             variables["limit"] = ("limit", list(held), "-", "limited quantity")

@@ -254,7 +254,10 @@ void MapSeeking::sample(std::size_t c, Best& out) noexcept {
 }
 
 MapSeeking::Best MapSeeking::best(std::size_t c) noexcept {
-  if (!known()) return {unscaled(first_input(cell(c))), settings_.space.upper - settings_.space.lower};
+  if (!known()) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    return {unscaled(first_input(cell(c))), settings_.space.upper - settings_.space.lower, nan, nan, nan, nan};
+  }
   know_cells();
   const int at = static_cast<int>(c) * per_place;
   const double expected = (settings_.maximize ? 1.0 : -1.0) * j_.mean(at);

@@ -80,7 +80,7 @@ class MapSeeking {
     double gain = 0.0;  ///< by which the reading is expected to raise J, summed over the cells
     double sd = 0.0;    ///< of J there, before it
   };
-  /// What is known of the best input of a point.
+  /// What is known of the best input of a point; NaN while there are fewer readings than numbers.
   struct Best {
     Inputs input, input_sd;
     double expected = 0.0, sd = 0.0;  ///< of J there, without the noise of a reading
