@@ -8,8 +8,7 @@ title use the figure's `suptitle`.
 from __future__ import annotations
 
 from mgdd._rooms import furnish as _furnish
-from mgdd.plot.cycle import pressure
-from mgdd.plot.cycles import cycles
+from mgdd.plot.cycles import cycles, pressure
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
 from mgdd.plot.seeking import seeking

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.plot.cycle import pressure
+from mgdd.plot.cycles import pressure
 from mgdd.plot.maps import map_cells
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors

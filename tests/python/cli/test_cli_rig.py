@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import pty
@@ -16,13 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 from mgdd.cli import main
-from mgdd.cli.rig_run import LiveView
-from mgdd.loop import Measurement
 from mgdd.rig import read_record
-from mgdd.rig.experiment.stand import Cycle
 from typed import Capsys
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
@@ -276,16 +271,3 @@ def test_without_the_extra_a_simulation_runs_and_a_bus_names_it(file: Path, tmp_
     done = subprocess.run([*command, "--mode", "hil"], capture_output=True, text=True)
     assert done.returncode == 2
     assert 'pip install "mgdd[can]"' in json.loads(done.stdout)["error"]["message"]
-
-
-def test_the_live_view_shows_what_was_asked_applied_and_measured() -> None:
-    stream = io.StringIO()
-    console = Console(file=stream, force_terminal=True, width=80, height=30, color_system=None)
-    with LiveView("track, bench", 4, console=console) as view:
-        for number in range(4):
-            measured = Measurement(values={"sensed_angle_deg": 20.0 + number}, applied={"duty": 0.25})
-            view(Cycle(number, {"duty": 0.5}, measured, 1e-5, 1e-4))
-    seen = stream.getvalue()
-    assert "4 of 4" in seen
-    assert {"asked", "applied", "measured"} <= set(seen.split())
-    assert "23" in seen
