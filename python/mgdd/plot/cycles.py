@@ -1,4 +1,4 @@
-"""Cycles: one over its angle and as log p over log V; many as a cloud, from cycle to cycle, as a map, and their spectrum."""
+"""Cycles: one over its angle and as log p over log V; many as a cloud, one by one, as a map, and their spectrum."""
 
 from __future__ import annotations
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from mgdd import _core
 from mgdd.errors import Interrupted
-from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
 from mgdd.identify.throttle.free_run import below_ceiling, draw_free_run, free_run, noise_of, quality_of, source_of
@@ -30,7 +29,7 @@ from mgdd.identify.throttle.whole_delay import (
     whole_delay,
     with_delay,
 )
-from mgdd.optimize.least_squares import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options, spread_starts
 from mgdd.parallel.finished import hand_over
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
