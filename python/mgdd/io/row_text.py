@@ -1,4 +1,4 @@
-"""The rows of a text as bytes, taken apart and read by the core; where those of numbers begin, and what stands above."""
+"""The rows of a text as bytes, taken apart and read by the core; where numbers begin, and what stands above them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Rows:
         return self.line.size
 
     def __getitem__(self, index: int) -> tuple[int, str]:
-        return int(self.line[index]), self._text(int(self.begin[index]), int(self.end[index]))
+        return int(self.line[index]), self.raw[self.begin[index] : self.end[index]].decode("utf-8", "surrogatepass")
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
         return map(self.__getitem__, range(len(self)))
@@ -85,9 +85,6 @@ class Rows:
         """Return columns, which increase, as the rows of an array, and which of them hold finite numbers alone."""
         values, plain = core.row_numbers(self.raw, self.begin, self.end, mark or "", decimal == ",", list(columns))
         return values, np.asarray(plain, np.bool_)
-
-    def _text(self, begin: int, end: int) -> str:
-        return self.raw[begin:end].decode("utf-8", "surrogatepass")
 
 
 def cells_of(text: str, mark: str | None) -> tuple[str, ...]:

@@ -185,7 +185,7 @@ def _structure(
         fits[(GAP,)] = best_of(tries)
         fits[(DROP, GAP)] = hunt.search({**fits[(GAP,)].values, "stribeck_drop": 0.1}, of([DROP, GAP]), _COARSE, 30)
     n = independent_samples(best_of(fits.values()))
-    best = min(fits, key=lambda one: _criterion(fits[one], len(of(one)), n))
+    best = min(fits, key=lambda one: 2.0 * n * math.log(max(fits[one].rmse, FLOOR_DEG)) + len(of(one)) * math.log(n))
     # Sticking makes the cost rough: what the other structures have found are further starts of the chosen one.
     parameters = {name: fits[best].values[name] for term in best for name in term}
     others = [one.values for one in sorted(fits.values(), key=lambda one: one.rmse)[1:3]]
@@ -221,10 +221,6 @@ def _without(hunt: Hunt, search: Search, terms: list[tuple[str, ...]]) -> tuple[
         if not missed(smaller, search, len(term), n):
             search, terms = smaller, [one for one in terms if one != term]
     return search, terms
-
-
-def _criterion(search: Search, size: int, n: float) -> float:
-    return 2.0 * n * math.log(max(search.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
 def _findings(fit: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
