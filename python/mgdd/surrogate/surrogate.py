@@ -96,7 +96,7 @@ def _roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.floa
 
 
 def _within(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.all([curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max()) for curve in curves], axis=0)
+    return np.asarray(np.all([curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max()) for curve in curves], axis=0))
 
 
 STEERED = "soi_cad"
