@@ -260,6 +260,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "loop.simulate_drive": lambda _: simulate_drive(DemandChain(), [10.0, 60.0], 2000.0),
     "loop.VirtualEngine.steady_map": lambda _: VirtualEngine().steady_map([-10.0, -6.0]),
     "optimize.IterativeLearning.history": lambda _: learned(),
+    "optimize.MapSeeking.cells": lambda _: optimize.MapSeeking({"x": (-1.0, 1.0)}, {"fuel_mg": [6.0, 9.0]}).cells(),
     "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
     "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),
     "maps.CalibrationMap.to_dataset": lambda _: timing_table().to_dataset(),

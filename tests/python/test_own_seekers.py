@@ -32,14 +32,14 @@ def test_seekers_of_the_page_find_the_best_and_go_on(page: dict[str, Any]) -> No
     assert page["more"].seeker.cycle == 500
     assert page["more"].run.dataset.sizes["cycle"] == 100
     two = seek(page["plant"], page["two"], seeker=page["found"].seeker.own.__class__(
-        [-12.0, 25.0], [-25.0, 0.0], [15.0, 40.0], kappa=0.5, period=40, harmonics=(4, 5)), cycles=900)  # fmt: skip
+        [-12.0, 25.0], ([-25.0, 0.0], [15.0, 40.0]), kappa=0.5, period=40, harmonics=(4, 5)), cycles=900)  # fmt: skip
     for inputs in (page["seeker"].estimate, list(two.inputs.values())):
         np.testing.assert_allclose(inputs, [-4.0, 15.0], atol=1.0)
 
 
 @pytest.mark.parametrize("scale", [1.0, 5.0])
 def test_the_newton_form_does_not_mind_the_scale_of_j(page: dict[str, Any], scale: float) -> None:
-    seeker, estimates, hessians = page["NewtonSeeking"](12.0, -30.0, 30.0, hessian=-0.051), [], []
+    seeker, estimates, hessians = page["NewtonSeeking"](12.0, (-30.0, 30.0), hessian=-0.051), [], []
     for _ in range(700):
         seeker.tell(-scale * 0.5 * 0.051 * seeker.ask()[0] ** 2)
         estimates.append(float(seeker.estimate[0]))
@@ -50,7 +50,7 @@ def test_the_newton_form_does_not_mind_the_scale_of_j(page: dict[str, Any], scal
 
 
 def test_the_bounded_form_never_steps_beyond_amplitude_times_omega(page: dict[str, Any]) -> None:
-    seeker, rng, asked = page["BoundedSeeking"](0.0, -30.0, 30.0), np.random.default_rng(2), []
+    seeker, rng, asked = page["BoundedSeeking"](0.0, (-30.0, 30.0)), np.random.default_rng(2), []
     for _ in range(2000):
         asked.append(float(seeker.ask()[0]))
         seeker.tell(rng.normal(0.0, 1e3))
@@ -91,7 +91,7 @@ def test_an_object_is_told_what_it_takes() -> None:
 
 
 def test_a_failed_cycle_is_asked_again_and_a_new_point_is_a_restart(page: dict[str, Any]) -> None:
-    seeker = page["BoundedSeeking"](-12.0, -25.0, 10.0)
+    seeker = page["BoundedSeeking"](-12.0, (-25.0, 10.0))
     bench = VirtualEngine(seed=2, limits=["p_max_bar"], misfire_probability=0.1)
     found = seek(bench, BOUNDS, seeker=seeker, cycles=500)
     assert abs(found.inputs["soc_cad"] + 5.63) < 2.0

@@ -23,7 +23,7 @@ from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignit
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration
 from mgdd.identify.throttle.automatic import fit_groups
-from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
+from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, seek_map, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.plot.response import response_diagnostics
@@ -102,6 +102,9 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "SeekResult": lambda _: seek(VirtualEngine(seed=1), {"soc_cad": (-25.0, 10.0)}, cycles=40),
     "FrontResult": lambda _: seek_front(
         VirtualEngine(seed=1), {"soc_cad": (-15.0, 5.0)}, {"efficiency_gross": "max", "nox_soft_ppm": "min"}, cycles=60
+    ),
+    "MapSearch": lambda _: seek_map(
+        lambda x: -((x["soc_cad"] + 0.1 * x["fuel_mg"]) ** 2), {"soc_cad": (-9.0, 5.0)}, {"fuel_mg": [10, 20]}, visits=5
     ),
     "Fit": lambda _: throttle_fit(),
     "CylinderFit": lambda _: cylinder_fit(),

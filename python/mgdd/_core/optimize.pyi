@@ -1404,11 +1404,10 @@ class MapSeeking:
     """
     A map by Gaussian processes; see mgdd.optimize.MapSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, context: collections.abc.Sequence[Input] | None = None, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, averaged: typing.SupportsFloat | typing.SupportsIndex = 1.0, moving_cost: typing.SupportsFloat | typing.SupportsIndex = 0.0, memory_readings: typing.SupportsFloat | typing.SupportsIndex = 1000.0, kept: typing.SupportsInt | typing.SupportsIndex = 200, reach: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, context: collections.abc.Sequence[Input] | None = None, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, averaged: typing.SupportsFloat | typing.SupportsIndex = 1.0, moving_cost: typing.SupportsFloat | typing.SupportsIndex = 0.0, memory_readings: typing.SupportsFloat | typing.SupportsIndex = 1000.0, kept: typing.SupportsInt | typing.SupportsIndex = 200, reach: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
         """
         start : first estimate, per input
-        lower : least applied input, per input
-        upper : largest applied input, per input
+        bounds : least and largest applied input, each a number or one per input; none without
         inputs : names, units, bounds and scales
         context : numbers of an operating point
         axes : entries of each, whose product are the cells

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -13,6 +14,7 @@ from mgdd.loop.lower_limits import plain_name
 from mgdd.maps import CalibrationMap
 from mgdd.maps.cells import MapTask
 from mgdd.optimize.inputs import unit_of_input
+from mgdd.optimize.map_seeking import nearest_cell
 from mgdd.results.describe import Row
 from mgdd.results.finding import Finding, findings_html
 from mgdd.results.labels import labelled_dataset, named_label
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from mgdd.optimize.map_seeking import MapSeeking
+    from mgdd.optimize.map_seeking import MapDriver, MapSeeking
 
 _NOTHING = 0.3  # share of the guide below which it explains as good as nothing
 _HELD = 0.02  # shares of a limit: nearer than that it holds the cell back
@@ -70,7 +72,7 @@ class MapSearch(Result):
         Reasons to doubt the map.
     seeker : MapSeeking
         Goes on where the search ended: ``seek_map(plant, ..., seeker=found.seeker)``, or ``seeker.ask(point)`` as the
-        engine is driven.
+        engine is driven; `driven` then gives the map.
     """
 
     cells: xr.Dataset
@@ -95,6 +97,32 @@ class MapSearch(Result):
             have = ", ".join(self.maps) or "none: a CalibrationMap has one or two axes"
             raise ParameterError(f"map: there are several, {have}: take one from .maps")
         return next(iter(self.maps.values()))
+
+    def driven(self, driver: MapDriver) -> Self:
+        """Give the map as it is known after the engine was driven.
+
+        Parameters
+        ----------
+        driver : MapDriver
+            Of this search, ``found.seeker.driver()``.
+
+        Returns
+        -------
+        MapSearch
+            Cells near which it was driven have the source ``learned`` and its readings beside their visits as
+            ``support``; the provenance says how many cycles there were.
+        """
+        made = type(self).of(driver.search, self.visits, tolerance=None, interrupted=False)
+        there = driver.readings > 0.0
+        maps = {}
+        for name, table in made.maps.items():
+            learnt = there & (table.cells["source"] == "optimised")
+            cells = {
+                "source": np.where(learnt, "learned", table.cells["source"]),
+                "support": table.cells["support"] + driver.readings,
+            }
+            maps[name] = table.replaced(cells=cells, provenance={"driven": f"{driver.readings.sum():g} cycles"})
+        return dataclasses.replace(made, maps=maps)
 
     @property
     def regret(self) -> float:
@@ -192,7 +220,7 @@ def _counts(axes: Mapping[str, Any], visits: Sequence[Visit]) -> Any:
     """Count the visits whose nearest cell each is."""
     counts = np.zeros(tuple(column.size for column in axes.values()))
     for one in visits:
-        counts[tuple(int(np.argmin(np.abs(column - one.at[name]))) for name, column in axes.items())] += 1.0
+        counts[nearest_cell(axes, one.at)] += 1.0
     return counts
 
 

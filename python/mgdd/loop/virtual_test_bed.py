@@ -53,8 +53,8 @@ class VirtualTestBed:
     >>> bed.input_names
     ('speed_rpm', 'fuel_mg', 'soc_cad')
     >>> bed.apply({"speed_rpm": 1500.0, "fuel_mg": 20.0, "soc_cad": -5.0})
-    >>> round(bed.measure().limits["p_max_bar"])
-    99
+    >>> bool(95.0 < bed.measure().limits["p_max_bar"] < 110.0)
+    True
     """
 
     def __init__(
@@ -122,14 +122,20 @@ class VirtualTestBed:
         return dataclasses.replace(measured, applied={**at, **measured.applied})
 
     def steady(self, columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
-        """Give J and limits without noise, each sensor settled, at columns of all inputs; NaN where none has a cycle.
+        """Give J and limits without noise, each sensor settled, at columns of all inputs; NaN where there is no cycle.
+
+        Parameters
+        ----------
+        columns : mapping of str to array_like
+            All of `input_names`, broadcast together.
 
         Returns
         -------
         dict
             ``j`` and every limit by name, one number per row.
         """
-        table = np.stack([np.ravel(np.asarray(columns[name], np.float64)) for name in self.input_names], axis=1)
+        every = np.broadcast_arrays(*(np.asarray(columns[name], np.float64) for name in self.input_names))
+        table = np.stack([column.ravel() for column in every], axis=1)
         out = np.full((len(table), 1 + len(self.limit_names)), np.nan)
         points, where = np.unique(table[:, : len(self._axes)], axis=0, return_inverse=True)
         for k, at in enumerate(points):

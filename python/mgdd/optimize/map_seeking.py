@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from mgdd.optimize import Input
+    from mgdd._core.optimize import Input
 
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7}  # of a guide, per input
 _REFUSED = ("J is not one number", "wrong number of limits", "a number that is not a reading: finite, within 1e30")
@@ -125,8 +125,8 @@ class MapSeeking(_core.optimize.MapSeeking):
     ...     search.tell(visit.at, visit.inputs, engine({**visit.at, **visit.inputs}))
     >>> search.cells()["soc_cad"].values.round(1).tolist()[0]
     [-2.0, -3.0, -4.0]
-    >>> {name: round(x, 1) for name, x in search.ask({"speed_rpm": 1250, "fuel_mg": 15}).items()}
-    {'soc_cad': -3.2}
+    >>> bool(abs(search.ask({"speed_rpm": 1250, "fuel_mg": 15})["soc_cad"] + 3.25) < 0.2)
+    True
     """
 
     def __init__(
@@ -348,6 +348,11 @@ class MapDriver:
     search : MapSeeking
         Changes as the engine runs.
 
+    Attributes
+    ----------
+    readings : numpy.ndarray
+        How many it has learnt from, by their nearest cell.
+
     Examples
     --------
     >>> from mgdd.optimize import MapSeeking
@@ -363,6 +368,7 @@ class MapDriver:
 
     def __init__(self, search: MapSeeking) -> None:
         self.search = search
+        self.readings = np.zeros(tuple(column.size for column in search.axes.values()))
         self._bounds = {one.name: (one.lower, one.upper) for one in search.settings["context"]}
         self._point: dict[str, float] | None = None
         self._outside = False
@@ -414,7 +420,13 @@ class MapDriver:
             return
         assert self._point is not None  # noqa: S101 - ask() has refused it
         self.search.tell(self._point, inputs, None if misfire else J, limits, misfire=misfire)
+        self.readings[nearest_cell(self.search.axes, self._point)] += 1.0
         self._asked = None
+
+
+def nearest_cell(axes: Mapping[str, ArrayLike], at: Mapping[str, float]) -> tuple[int, ...]:
+    """Give the place of the cell that is nearest to a point on every axis."""
+    return tuple(int(np.argmin(np.abs(np.asarray(column) - at[name]))) for name, column in axes.items())
 
 
 def entries_of(axes: Any, inputs: Sequence[str]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:

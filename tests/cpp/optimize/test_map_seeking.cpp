@@ -49,10 +49,12 @@ Surface surface_of(const Plant& plant, bool knock) {
   std::vector<double> sparks, values;
   for (double spark = -10.0; spark <= 45.0; spark += 2.5)
     sparks.push_back(spark);
-  for (const double speed : speeds)
-    for (const double load : loads)
+  for (const double speed : speeds) {
+    for (const double load : loads) {
       for (const double spark : sparks)
         values.push_back(knock ? plant.knock(point(speed, load), spark) : plant.torque(point(speed, load), spark));
+    }
+  }
   return Surface({speeds, loads, sparks}, values);
 }
 
@@ -176,10 +178,11 @@ TEST(MapSeeking, KeepsOutOfACellThatFails) {
     const MapSeeking::Visit visit = search.suggest();
     const bool fails = visit.context[0] > 3.5 && visit.context[1] < 0.4;
     failed += fails ? 1 : 0;
-    if (fails)
+    if (fails) {
       EXPECT_EQ(search.tell(visit.context, visit.input, {.misfire = true}), TellStatus::misfire);
-    else
+    } else {
       read(search, plant, visit.context, visit.input, k);
+    }
   }
   EXPECT_LE(failed, 4);
 }
@@ -205,7 +208,7 @@ TEST(MapSeeking, RefusesSettingsByName) {
     MapSeekingSettings s = settings(0, &plant);
     change(s);
     try {
-      MapSeeking search(std::move(s));
+      MapSeeking const search(std::move(s));
     } catch (const Error& error) {
       return std::string(error.what());
     }

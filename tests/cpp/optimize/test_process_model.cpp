@@ -102,9 +102,10 @@ TEST(ProcessModel, FullItForgetsOldReadingsNearTheEstimateAndKeepsFarOnes) {
 TEST(ProcessModel, ARowOfCovariancesIsThatOfEachPair) {
   ProcessModel model = told(25, 0.2, {.most_points = 700});
   InputTable points(700, 2);
-  for (int p = 0; p < 700; ++p)
+  for (int p = 0; p < 700; ++p) {
     points.row(p) << random::uniform(5, 1, static_cast<std::uint64_t>(p)),
         random::uniform(5, 2, static_cast<std::uint64_t>(p));
+  }
   model.predict(points, 700);
   std::vector<double> row(700);
   model.covariances(3, 700, row.data());

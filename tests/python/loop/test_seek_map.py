@@ -177,8 +177,14 @@ def test_the_virtual_engine_is_driven_over_its_map() -> None:
     schedule = [(30 * k, OperatingPoint(speed_rpm=1200.0 + 400.0 * k, fuel_mg=14.0 + 4.0 * k)) for k in range(4)]
     drive = VirtualEngine("puma_single", schedule=schedule, limits=["p_max_bar"], seed=8)
     before = found.seeker.readings
-    run = seek(drive, {"soc_cad": (-20.0, 8.0)}, seeker=found.seeker.driver(), limits=limits, cycles=120)
+    driver = found.seeker.driver()
+    run = seek(drive, {"soc_cad": (-20.0, 8.0)}, seeker=driver, limits=limits, cycles=120)
     assert found.seeker.readings == before + 120
+    after = found.driven(driver).map
+    assert after.provenance["driven"] == "120 cycles"
+    assert set(after.cells["source"][driver.readings > 0.0]) == {"learned"}
+    assert after.cells["support"].sum() == 128
+    assert np.argwhere(driver.readings > 0.0).tolist() == [[0, 0], [1, 1], [2, 2]]
     for k in range(4):
         best = drive.find_optimum(limits, cycle=30 * k, bounds={"soc_cad": (-20.0, 8.0)})
         timings = run.run.dataset["applied"].to_numpy()[30 * k : 30 * k + 30, 0]

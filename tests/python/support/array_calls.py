@@ -24,7 +24,7 @@ from mgdd.engine import (
 )
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io.pressure_checks import check_trace
-from mgdd.loop import Reference, VirtualEngine, simulate_drive, track, track_many
+from mgdd.loop import Reference, VirtualEngine, VirtualTestBed, seek_map, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
 from mgdd.rig.exchange import RigRecord, flat
 from mgdd.rig.realtime import RingTransport
@@ -226,6 +226,18 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
     "loop.VirtualEngine.run": (lambda soc: VirtualEngine(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
     "loop.VirtualEngine.steady_map": (lambda soc: VirtualEngine().steady_map(soc)["j"].to_numpy(), (SOC,)),
+    "loop.VirtualTestBed.steady": (
+        lambda soc: VirtualTestBed().steady({"speed_rpm": 1500.0, "fuel_mg": 20.0, "soc_cad": soc})["j"], (SOC,),
+    ),
+    "loop.seek_map": (
+        lambda fuel: seek_map(
+            lambda x: -((x["x"] - 0.1 * x["fuel_mg"]) ** 2), {"x": (-2.0, 8.0)}, {"fuel_mg": fuel}, visits=4
+        ).map.values,
+        (FUEL,),
+    ),
+    "optimize.MapSeeking.__init__": (
+        lambda fuel: optimize.MapSeeking({"x": (-2.0, 2.0)}, {"fuel_mg": fuel}).axes["fuel_mg"], (FUEL,),
+    ),
     "loop.track": (
         lambda wanted, air: track(Pid(), wanted, airflow_torque_nm=air)["angle_deg"].to_numpy(), (OPEN, 1e-3 * OPEN),
     ),

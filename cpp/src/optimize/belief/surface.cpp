@@ -43,28 +43,43 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
     on[i] = cubic_weights(axes_[i], interval_of(axes_[i], held), held);
     if (held != at[own]) on[i].slope.fill(0.0);
   }
-  double value = 0.0;
-  slopes.setZero();
-  while (true) {  // over the nodes around, the last axis fastest
+  // The nodes around, then without their last axis, and so on: what is left of the value and of every slope.
+  constexpr Eigen::Index around = 1024;
+  static_assert(most_inputs == 5);  // of four nodes each
+  Eigen::Array<double, around, 1> value;
+  Eigen::Array<double, around / 4, most_inputs> slope;  // a column per axis
+  Eigen::Index left = 0;
+  for (bool more = true; more; ++left) {
     std::size_t node = 0;
-    double weight = 1.0;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < n; ++i)
       node += (on[i].first + step[i]) * stride[i];
-      weight *= on[i].value[step[i]];
-    }
-    value += weight * values_[node];
-    for (std::size_t i = 0; i < n; ++i) {
-      double slope = on[i].slope[step[i]];
-      for (std::size_t j = 0; j < n; ++j) {
-        if (j != i) slope *= on[j].value[step[j]];
-      }
-      slopes[static_cast<Eigen::Index>(i)] += slope * values_[node];
-    }
+    value[left] = values_[node];
     std::size_t axis = n;
     while (axis > 0 && ++step[axis - 1] == on[axis - 1].count)
       step[--axis] = 0;
-    if (axis == 0) return value;
+    more = axis > 0;
   }
+  const auto axes = static_cast<Eigen::Index>(n);
+  for (Eigen::Index i = axes; i-- > 0;) {
+    const CubicWeights& own = on[static_cast<std::size_t>(i)];
+    const auto count = static_cast<Eigen::Index>(own.count);
+    left /= count;
+    const auto contract = [&](const double* from, const std::array<double, 4>& weights) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < own.count; ++k)
+        sum += weights[k] * from[k];
+      return sum;
+    };
+    for (Eigen::Index p = 0; p < left; ++p) {
+      const Eigen::Index from = p * count;
+      slope(p, i) = contract(&value[from], own.slope);
+      for (Eigen::Index k = i + 1; k < axes; ++k)
+        slope(p, k) = contract(&slope(from, k), own.value);
+      value[p] = contract(&value[from], own.value);
+    }
+  }
+  slopes = slope.row(0).head(axes).matrix().transpose();
+  return value[0];
 }
 
 }  // namespace mgdd::optimize

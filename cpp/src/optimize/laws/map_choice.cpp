@@ -233,9 +233,10 @@ void MapSeeking::sample(std::size_t c, Best& out) noexcept {
   cholesky(joint_, n);
   Inputs squares = Inputs::Zero(inputs_);
   for (std::uint64_t s = 0; s < regret_samples; ++s) {
-    for (Eigen::Index k = 0; k < n; ++k)
+    for (Eigen::Index k = 0; k < n; ++k) {
       worth_.effect[static_cast<std::size_t>(k)] =
           random::normal(settings_.seed, 450 + s, static_cast<std::uint64_t>(k));
+    }
     double most = 0.0, own = 0.0;
     Eigen::Index best = 0;
     for (Eigen::Index k = 0; k < n; ++k) {

@@ -110,8 +110,9 @@ void MapSeeking::search(std::span<Place> places) noexcept {
       put(row++, place.context, place.best);
       for (int p = 1; p < cloud; ++p, ++row) {
         Inputs z = place.best;
+        const auto stream = 420 + static_cast<std::uint64_t>(max_inputs) * static_cast<std::uint64_t>(round);
         for (Eigen::Index i = 0; i < inputs_; ++i)
-          z[i] += width * normal(420 + static_cast<std::uint64_t>(max_inputs * round + i), row);
+          z[i] += width * normal(stream + static_cast<std::uint64_t>(i), row);
         put(row, place.context, z);
       }
     }

@@ -191,7 +191,7 @@ Inputs MapSeeking::unscaled(const Inputs& z) const noexcept {
 
 // The nearest input within the bounds, in whole steps where it has some.
 Inputs MapSeeking::settable(const Inputs& z) const noexcept {
-  const Inputs within = z.cwiseMax(0.0).cwiseMin(1.0);
+  Inputs within = z.cwiseMax(0.0).cwiseMin(1.0);
   if (!steps_.any()) return within;
   return scaled(steps_.nearest(unscaled(within), [](const Inputs&) { return 0.0; }));
 }
