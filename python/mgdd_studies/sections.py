@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd.report import Section, Table
-from mgdd.report.sections import as_number
+from mgdd.report.report import as_number
 from mgdd.results.labels import VARIABLES, label_of
 from mgdd.results.units import unit_of
 

@@ -27,7 +27,7 @@ from mgdd.results.describe import Row, as_html, as_text, picture_of, rows_of
 from mgdd.results.units import unit_of
 from mgdd.signals import chirp
 from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, simulate_throttle
 from mgdd_studies.benchmarks.drive_axis import DriveModel
 from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation

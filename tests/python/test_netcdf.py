@@ -52,7 +52,7 @@ from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.rig.realtime import RingTransport
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, characteristics, simulate_throttle

@@ -34,7 +34,7 @@ from mgdd.rig import Experiment, Recorder, read_record, run_experiment
 from mgdd.rig.experiment.self_test import WAYS_OF, SelfTest
 from mgdd.signals import chirp
 from mgdd.surrogate import fit_response, fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.throttle import Throttle, simulate_throttle
 from mgdd_studies import run_study
 from public_objects import MODULES

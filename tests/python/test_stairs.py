@@ -195,7 +195,7 @@ def write(root: Path, file: str, text: str) -> None:
         ("python/mgdd/cli/a.py", "from mgdd_studies import run_study\n", "cli must not use mgdd_studies"),
         ("python/mgdd/cli/a.py", "import mgdd_studies.base\n", "cli must not use mgdd_studies"),
         ("python/mgdd/plot/a.py", "def f():\n    from mgdd import engine\n", "plot must not use engine"),
-        ("python/mgdd/io/a.py", "import mgdd.plot.cycle\n", "io must not use plot"),
+        ("python/mgdd/io/a.py", "import mgdd.plot.cycles\n", "io must not use plot"),
         ("python/mgdd/engine.py", "import mgdd\n", "unknown room 'mgdd'"),
         ("python/mgdd/attic.py", "from mgdd import errors\n", "unknown room 'attic'"),
     ],

@@ -12,7 +12,7 @@ from mgdd import datasets
 from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
 from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd_studies import measured_engine_cases, measured_engine_seek, run_study
 from mgdd_studies.base import StudyResult

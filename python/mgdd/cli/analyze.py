@@ -32,8 +32,7 @@ from mgdd.presets.preset import Preset
 from mgdd.report import Section, Table
 from mgdd.report.page import write_page
 from mgdd.report.records import DRAWN_CYCLES, record_section
-from mgdd.results.labels import VARIABLES
-from mgdd.results.units import unit_of
+from mgdd.results.labels import named_label
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -237,7 +236,7 @@ def _table(payload: dict[str, Any]) -> list[str | Table]:
         (
             name,
             *(cell(f"{before}{name}{after}") for before, after in _COLUMNS.values()),
-            VARIABLES[name].units if name in VARIABLES else unit_of(name),
+            named_label(name).units,
         )
         for name in names
     )

@@ -7,12 +7,10 @@ import json
 import logging
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.progress import is_terminal, trusted
 from mgdd.errors import Interrupted, ParameterError, printable
 from mgdd.io.files import write_whole, write_whole_text
 from mgdd.io.plain_csv import write_traces
@@ -100,7 +98,7 @@ def emit(
     if args.json:
         print(json_text(plain))
     else:
-        print(show([text] if isinstance(text, str) else text or [lines(plain)]), file=trusted(sys.stdout))
+        print(show([text] if isinstance(text, str) else text or [lines(plain)]))
     if figure is not None and args.figure is not None:
         save_figure(figure(), args.figure)
 
@@ -133,65 +131,21 @@ def _plain(value: Any) -> Any:
 
 
 def show(blocks: Sequence[str | Table]) -> str:
-    """Lay out text and tables: by rich in a terminal, else as plain columns.
-
-    Heads and cells of tables stand as they are, but for what a terminal would obey; numbers to the right.
-    """
-    blocks = [
-        printable(block) if isinstance(block, str)
-        else replace(
-            block, columns=tuple(map(_cell, block.columns)), rows=tuple(tuple(map(_cell, row)) for row in block.rows)
-        )
-        for block in blocks
-    ]  # fmt: skip
-    if not is_terminal():
-        return "\n".join(block if isinstance(block, str) else _columns(block) for block in blocks)
-    from rich.console import Console
-    from rich.table import Table as RichTable
-
-    console = Console()
-    with console.capture() as captured:
-        for block in blocks:
-            if isinstance(block, str):
-                console.print(block, markup=False, highlight=False, soft_wrap=True)
-                continue
-            grid = RichTable(box=None, header_style="bold", pad_edge=False)
-            for head, text in zip(block.columns, _are_texts(block), strict=True):
-                grid.add_column(_literal(head), justify="left" if text else "right", overflow="fold")
-            for row in block.rows:
-                grid.add_row(*map(_literal, row))
-            console.print(grid)
-    return captured.get().rstrip("\n")
-
-
-def _cell(text: str) -> str:
-    return printable(text).replace("\n", "\\n")
-
-
-def _literal(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)
-
-
-def _are_texts(table: Table) -> list[bool]:
-    return [
-        all(row[place][:1].isalpha() or not row[place] for row in table.rows) for place in range(len(table.columns))
-    ]
+    """Lay out text and tables, numbers to the right; of heads and cells what a terminal would obey is written out."""
+    return "\n".join(printable(block) if isinstance(block, str) else _columns(block) for block in blocks)
 
 
 def _columns(table: Table) -> str:
     if not table.rows:
         return "(no rows)"
-    lines = [table.columns, *table.rows]
-    width = [max(len(line[place]) for line in lines) for place in range(len(table.columns))]
-    texts = _are_texts(table)
-    return "\n".join(
-        "  ".join(
-            cell.ljust(size) if text else cell.rjust(size) for cell, size, text in zip(line, width, texts, strict=True)
-        ).rstrip()
-        for line in lines
-    )
+    columns = [
+        [printable(cell).replace("\n", "\\n") for cell in column]
+        for column in zip(table.columns, *table.rows, strict=True)
+    ]
+    for column in columns:
+        width, text = max(map(len, column)), all(cell[:1].isalpha() or not cell for cell in column[1:])
+        column[:] = [cell.ljust(width) if text else cell.rjust(width) for cell in column]
+    return "\n".join("  ".join(line).rstrip() for line in zip(*columns, strict=True))
 
 
 def json_text(plain: Any) -> str:

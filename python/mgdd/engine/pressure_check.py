@@ -252,7 +252,7 @@ def check_pressure(
     doubts += record_doubts(made, figures, engine, point_of(point))
     fuel_mg = stated("fuel_mg", fuel_mg, point)
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
-    given = [key for key, value in judged.items() if value or _has_number(made, key)]
+    given = [key for key, value in judged.items() if value or not math.isnan(float(made.attrs.get(key, math.nan)))]
     skipped = _skipped(made, figures, given) | hidden(made, figures, engine)
     swing = _SWING if made.attrs.get("angle_from") == "time" else ""
     checks = [_check(check, kinds, doubts, skipped, swing) for check, kinds in _CHECKS.items()]
@@ -266,10 +266,6 @@ def check_pressure(
 def _of_angle(text: str) -> bool:
     """Whether a line of the reader is one that the record repeats."""
     return "crank angle slips" in text or "a turn of the shaft is missing" in text
-
-
-def _has_number(trace: xr.Dataset, name: str) -> bool:
-    return name in trace.attrs and not math.isnan(float(trace.attrs[name]))
 
 
 def _check(

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.identify.ode_model import Derivative, OdeModel, Output, output_or_first_state, run_in_lockstep
-from mgdd.identify.starts import spread_starts
 from mgdd.optimize import least_squares
-from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of
+from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of, spread_starts
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.results import Fit
 from mgdd.results.fit_report import FitReport

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
-from mgdd.io.array_files import of_hdf5, of_matlab, of_netcdf, of_numpy, of_parquet
+from mgdd.io.array_files import of_hdf5, of_matlab, of_mdf, of_netcdf, of_numpy, of_parquet, of_tdms
 from mgdd.io.array_table import ArrayTable, Columns, Named, columns_of, naming_damage
 from mgdd.io.column_names import heading
 from mgdd.io.extras import import_extra
 from mgdd.io.files import bytes_of, existing_file, read_plain_text
-from mgdd.io.recorder_files import of_mdf, of_tdms
 from mgdd.io.row_text import parse_number
 from mgdd.io.table import Table, TextTable, read_table, text_table
 from mgdd.results.labels import ANGLE

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.angle_column import Angle, angle_of, headings
@@ -162,7 +161,7 @@ def _pressures(
     out: list[tuple[int, ...]] = []
     for group in groups:
         cycles = len(group) > 1 and angle.cycles < 1.5
-        alike = cycles and (table.header is None or _alike(angle.degrees, table.matrix(group)))
+        alike = cycles and (table.header is None or odd_shape(angle.degrees, table.matrix(group)) is None)
         out += [group] if alike else [(i,) for i in group]
     sizes = {len(group) for group in out}
     if len(sizes) > 1:
@@ -172,10 +171,6 @@ def _pressures(
             f"of one, {argument('pressure_column', '')}"
         )
     return sorted(out)
-
-
-def _alike(degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> bool:
-    return odd_shape(degrees, rows) is None
 
 
 def _numbers_cycles(table: Table, head: Heading, index: int) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import inspect
-import itertools
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -14,21 +13,19 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.angle_column import Angle, angle_of, headings
+from mgdd.io.angle_column import angle_of, headings
 from mgdd.io.any_table import TEXT, format_of
-from mgdd.io.column_names import Heading
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.io.cycles import SAME_ANGLE, several_cycles
 from mgdd.io.files import decoded, existing_file
 from mgdd.io.pressure import CYCLE, cycles_dataset, read_pressure
-from mgdd.io.pressure_file import Pressure, Record, checked, choose_pressure, pressure_of, record_of
+from mgdd.io.pressure_file import Record, choose_pressure, cycles_of
 from mgdd.io.reading import Reading
 from mgdd.io.row_text import Rows
 from mgdd.io.table import TextTable, check_text_options, require_width, text_table
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
 # Rows that are looked at first, four times as many until they hold some cycles; and rows of text in memory at a time.
 _ROWS, _CYCLES = 1 << 16, 4
@@ -101,7 +98,7 @@ def _chunks(
             rows = TextRows(path, stream, delimiter=text["delimiter"], decimal=text["decimal"])
             plan = _planned(rows.part, how)
             if plan is not None:
-                yield from plan.chunks(cycles, path.name)
+                yield from plan.chunks(rows, cycles, path.name)
                 return
     whole = read_pressure(path, **options)
     if CYCLE not in whole.dims:
@@ -112,106 +109,56 @@ def _chunks(
 
 
 class _Plan(NamedTuple):
-    """Where the cycles of a file stand: sample ``place[i] + every * k`` is angle i of cycle k.
+    """How a file is cut: rows before its first cycle, rows of a cycle, and rows that the last one needs beside these.
 
-    A cycle needs `reach` samples from its first on; `angles` are those of the first `every` of them [deg, as in the
-    file], higher by `turn` a cycle later.
+    Rows from ``every * k`` on are then read as the file would be if it began there.
     """
 
-    part: Callable[[int, int], TextTable]
-    source: str
-    heads: list[Heading]
     how: Reading
-    angle: Angle
-    column: int
-    record: Record
-    place: NDArray[np.intp]
+    first: Record
+    head: int
     every: int
-    reach: int
-    angles: NDArray[np.float64]
-    turn: float
+    spare: int
 
-    @property
-    def first(self) -> int:
-        """Sample at which the first cycle begins."""
-        return int(self.place.min())
-
-    def count(self, samples: int) -> int:
-        """Whole cycles in so many samples from the first of one on."""
-        return (samples - self.reach) // self.every + 1
-
-    def chunks(self, cycles: int, name: str) -> Iterator[xr.Dataset]:
+    def chunks(self, rows: TextRows, cycles: int, name: str) -> Iterator[xr.Dataset]:
         """Give the cycles, so many at a time."""
-        at, done, mean = self.first, 0, None
-        notes = [f"{at} samples before the first cycle left out: incomplete"] if at else []
-        asked = cycles * self.every + self.reach  # shows whether another cycle follows
-        last = False
+        done, mean, last = 0, None, False
+        notes = [f"{self.head} samples before the first cycle left out: incomplete"] if self.head else []
         while not last:
-            source = f"{self.source} from cycle {done + 1} on" if done else self.source
-            samples = self.samples(at, at + asked, source)
-            held = samples.values.shape[1]
-            last = self.count(held) <= cycles
-            count = self.count(held) if last else cycles
-            left = held - (count - 1) * self.every - int(np.ptp(self.place)) - 1
+            again = min(done, 1)  # a single cycle of an angle that runs on would be taken for one in 0 to 720 degrees
+            start, asked = (done - again) * self.every, self.head + (again + cycles) * self.every + self.spare
+            table = rows.part(start, start + asked + self.every)
+            last = table.height < asked + self.every  # else another cycle follows
+            record = self.cycles_in(table if last else table.part(0, asked), done - again)
+            count = len(record.bar) - again
+            left = table.height - self.head - len(record.bar) * self.every
             if last and left:
                 notes.append(f"{left} samples behind the last cycle left out: incomplete")
-            record = self.cut(samples, count, source)
+            record = record._replace(bar=record.bar[again:])
             here = record.bar.mean(axis=0)
             if mean is not None:
                 ends = ("the first chunk", f"cycles {done + 1} to {done + count}")
                 pair = np.stack([mean, here])
-                notes += phase_warnings(record.angle, pair, over_time=False, source=source, ends=ends)
+                notes += phase_warnings(record.angle, pair, over_time=False, source=table.source, ends=ends)
             mean = here if mean is None else mean
             yield cycles_dataset(record._replace(notes=notes + record.notes), name, done + 1)
-            at, done, notes = at + count * self.every, done + count, []
+            done, notes = done + count, []
 
-    def samples(self, start: int, stop: int, source: str) -> Pressure:
-        """Read samples of the pressure, as one row, and refuse angles that are not those of the first cycle."""
-        indices = [*self.angle.columns, self.column]
-        parts, lines = [np.empty((len(indices), 0))], [np.empty(0, np.int64)]
-        following = stop - self.reach  # where the next chunk begins, which must not be passed by
-        table = self.part(start, start)
-        for at, end in itertools.pairwise([*range(start, following, _ROWS), following, stop]):
-            table = self.part(at, end)
-            if not table.height:
-                break
-            parts.append(table.matrix(indices))
-            lines.append(table.lines)
-        values = np.concatenate(parts, axis=1)
-        degrees: NDArray[Any] = np.arange(values.shape[1]) * (self.how.angle_step_deg or 0.0)
-        if not self.angle.made:
-            degrees = np.rad2deg(values[0]) if self.angle.unit == "rad" else values[0]
-            self._require_angles(degrees, start, source, np.concatenate(lines))
-        angle = self.angle._replace(degrees=degrees)
-        return pressure_of(table, self.heads, [self.column], self.how, angle, values[-1:])
-
-    def cut(self, pressure: Pressure, count: int, source: str) -> Record:
-        """Cut samples from the first of a cycle on, and check them."""
-        at = self.place - self.first + self.every * np.arange(count)[:, None]
-        record = checked(
-            self.record.angle,
-            pressure.values[0][at],
-            unit=pressure.unit,
-            firing_tdc_deg=None,
-            before_tdc=False,
-            source=source,
-            level=pressure.level,
-            unit_of_file=pressure.unit_of_file,
-        )
-        return record._replace(notes=[*pressure.notes, *record.notes], speed_rpm=self.record.speed_rpm)
-
-    def _require_angles(self, degrees: NDArray[np.float64], start: int, source: str, lines: NDArray[np.int64]) -> None:
-        at = start - self.first + np.arange(degrees.size)
-        meant = self.angles[at % self.every] + self.turn * (at // self.every)
-        step = float(np.median(np.abs(np.diff(self.angles))))
-        bad = np.flatnonzero(~(np.abs(degrees - meant) <= SAME_ANGLE * step))
-        if bad.size:
-            k = int(bad[0])
+    def cycles_in(self, table: TextTable, done: int) -> Record:
+        """Read the cycles behind those that are `done`; they must stand as the first ones do."""
+        source = f"{table.source} from cycle {done + 1} on" if done else table.source
+        record = cycles_of(replace(table, source=source), self.how)
+        step = float(np.median(np.diff(self.first.angle)))
+        whole = (table.height - self.head - self.spare) // self.every
+        alike = np.array_equal(record.rows, self.first.rows) and len(record.bar) == whole
+        if not alike or np.abs(record.angle - self.first.angle).max() > SAME_ANGLE * step:
             raise DataError(
-                f"{source}, line {lines[k]}: the crank angle is {degrees[k]:g}, and {meant[k]:g} if each cycle has the "
-                f"{self.every} samples of the first: repair or remove the cycle there; a record whose angles do not "
-                "repeat is read whole, by mgdd.io.read_pressure"
+                f"{source}, lines {table.lines[0]} to {table.lines[-1]}: other crank angles than those of the first "
+                "cycles: repair or remove the cycle there; a record whose angles do not repeat is read whole, by "
+                "mgdd.io.read_pressure"
             )
+        notes = [note for note in record.notes if "left out: incomplete" not in note]
+        return record._replace(angle=self.first.angle, notes=notes)
 
 
 def _planned(part: Callable[[int, int], TextTable], how: Reading) -> _Plan | None:
@@ -230,24 +177,15 @@ def _planned(part: Callable[[int, int], TextTable], how: Reading) -> _Plan | Non
     columns = choose_pressure(table, heads, how.pressure_column, angle)
     if samples < rows or len(columns) > 1:
         return None  # short, or a column per cycle
-    pressure = pressure_of(table, heads, columns, how, angle)
-    record = record_of(table, angle, pressure, how)
-    degrees, first = angle.degrees, int(record.rows.min())
-    falls, _ = several_cycles(-degrees if how.before_tdc else degrees)
+    how = replace(how, pressure_column=columns)
+    record = cycles_of(table, how)
+    falls, _ = several_cycles(-angle.degrees if how.before_tdc else angle.degrees)
     every = int(falls[1] - falls[0]) if falls.size > 1 else record.rows.size
-    turn = 0.0 if falls.size else 720.0
-    # Where cycles are joined of two parts, the second is in the next block of samples, which must be whole.
-    joined = np.where(record.rows < record.rows[0], record.rows + every, record.rows)
-    for place, reach in ((record.rows, np.ptp(record.rows) + 1), (joined, first + 2 * every - joined.min())):
-        angles = degrees[place.min() :][:every]
-        plan = _Plan(part, table.source, heads, how, angle, columns[0], record, place, every, int(reach), angles, turn)
-        own = pressure._replace(values=pressure.values[:, plan.first :])
-        count = plan.count(own.values.shape[1])
-        if count == len(record.bar):
-            made = plan.cut(own, count, table.source)
-            if np.array_equal(made.angle, record.angle) and np.array_equal(made.bar, record.bar):
-                return plan
-    return None
+    head = int(record.rows.min())
+    again, two = cycles_of(table.part(every, samples), how), cycles_of(table.part(0, head + 2 * every), how)
+    if not np.array_equal(again.bar, record.bar[1:]):
+        return None  # steps that do not divide a cycle, or samples that are missing
+    return _Plan(how, record, head, every, spare=(2 - len(two.bar)) * every)
 
 
 class TextRows:

@@ -79,12 +79,11 @@ def pressure_of(
     columns: list[int],
     how: Reading,
     angle: Angle,
-    values: NDArray[np.float64] | None = None,
 ) -> Pressure:
-    """Take columns, or `values` that were read of them, for cycles of one cylinder; refuse another shape or unit."""
+    """Take columns for cycles of one cylinder; refuse another shape or unit."""
     gain, notes = how.gain_bar_per_v, []
     unit, unit_of_file = _unit_of_pressure(table, heads, columns, how.pressure_unit, gain=gain is not None)
-    values = table.matrix(columns) if values is None else values
+    values = table.matrix(columns)
     if how.pressure_column is None and len(columns) > 1:
         odd = odd_shape(angle.degrees, values)
         if odd is not None:

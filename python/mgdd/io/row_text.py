@@ -1,7 +1,9 @@
-"""The rows of a text as bytes: found, taken apart into cells and read as numbers by the core, without a loop here."""
+"""The rows of a text as bytes, taken apart and read by the core; where numbers begin, and what stands above them."""
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -9,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mgdd._core import math as core
+from mgdd.errors import DataError
+from mgdd.io.column_names import bare_unit, spelled_unit
 
 _TAB = 9
 
@@ -48,7 +52,7 @@ class Rows:
         return self.line.size
 
     def __getitem__(self, index: int) -> tuple[int, str]:
-        return int(self.line[index]), self._text(int(self.begin[index]), int(self.end[index]))
+        return int(self.line[index]), self.raw[self.begin[index] : self.end[index]].decode("utf-8", "surrogatepass")
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
         return map(self.__getitem__, range(len(self)))
@@ -82,9 +86,6 @@ class Rows:
         values, plain = core.row_numbers(self.raw, self.begin, self.end, mark or "", decimal == ",", list(columns))
         return values, np.asarray(plain, np.bool_)
 
-    def _text(self, begin: int, end: int) -> str:
-        return self.raw[begin:end].decode("utf-8", "surrogatepass")
-
 
 def cells_of(text: str, mark: str | None) -> tuple[str, ...]:
     """Take a row apart; blanks and quotes around a cell do not belong to it."""
@@ -99,3 +100,108 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
         return float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:
         return None
+
+
+_ROWS = 4  # of one width, one below the other, are data
+_HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
+_RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh
+_COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
+
+
+def first_row_of(content: Rows, delimiter: str | None, decimal: str) -> int:
+    """Return where the rows of numbers begin: names, units, remarks and the lines of a preamble stand above them."""
+
+    def mark_of(text: str) -> str | None:
+        return delimiter if delimiter is not None else separator_of(text, decimal)
+
+    def filled_cells(text: str, mark: str | None) -> tuple[str, ...]:
+        cells = cells_of(text, mark)  # without the empty ones that a spreadsheet adds
+        return cells[: max((k + 1 for k, cell in enumerate(cells) if cell), default=1)]
+
+    last_head: int | None = None
+    for at, (_, text) in enumerate(content):
+        mark = mark_of(text)
+        cells = filled_cells(text, mark)
+        if _is_head(cells):
+            continue
+        if _like_number(cells[0]) or (not cells[0] and all(_like_number(cell) for cell in cells if cell)):
+            return at  # one of another width is refused by its line
+        if last_head is None:
+            later = ((k, content[k][1]) for k in range(len(content) - 1, at, -1))
+            last_head = next((k for k, row in later if _is_head(filled_cells(row, mark_of(row)))), at)
+        if at >= last_head:
+            return at
+        above = filled_cells(content[at - 1][1], mark) if at else ()
+        named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
+        below = [filled_cells(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
+        if named and all(len(one) == len(cells) and one[0] != _HEADER_ENDS for one in below):
+            return at
+    return len(content)
+
+
+def names_and_units(
+    heads: Sequence[tuple[str, ...]], width: int
+) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None]:
+    """Choose the lines above the rows that name the columns and their units; the others are remarks."""
+    whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
+    wide = [cells for cells in whole if len(cells) == width or (len(cells) > width and cells[0] == "X_Value")]
+    aligned = [cells[len(cells) - width :] for cells in wide]
+    # A remark that a spreadsheet made as wide has empty cells instead of names.
+    named = [row for row in aligned if 2 * sum(map(bool, row)) > width or spells_units(row)] or aligned[-1:]
+    rows = [at for at, cells in enumerate(named) if at and spells_units(cells)]
+    if rows:
+        return named[rows[-1] - 1], named[rows[-1]]
+    if len(heads) == len(named) == 2:
+        return named[0], named[1]
+    return (named[-1] if named else None), None
+
+
+def units_filled(
+    source: str, content: Rows, heads: Sequence[tuple[str, ...]], mark: str | None, width: int
+) -> list[tuple[str, ...]]:
+    """Give a row of units below the names an empty cell for each column behind the last that has one."""
+    made = list(heads)
+    for at in range(1, len(heads)):
+        cells = heads[at]
+        if not (len(heads[at - 1]) == width > len(cells) and spells_units(cells)):
+            continue
+        if mark is None:
+            raise DataError(
+                f"{source}, line {content.line[at]}: {len(cells)} units below {width} names, and blanks do not tell "
+                "which column has none: write - for its unit"
+            )
+        made[at] = (*cells, *("",) * (width - len(cells)))
+    return made
+
+
+def spells_units(cells: Sequence[str]) -> bool:
+    """Return whether a row holds units, and nothing else that is not empty."""
+    texts = [bare_unit(cell) for cell in cells]
+    are_units = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
+    bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
+    return (bool(are_units) and all(are_units)) or (bool(bracketed) and all(bracketed))
+
+
+def _is_head(cells: tuple[str, ...]) -> bool:
+    """Return whether a row holds names: no numbers, or behind a first name nothing but a count of columns."""
+    if not any(_like_number(cell) for cell in cells):
+        return True
+    counted = [int(cell) for cell in cells[1:] if _COUNT.fullmatch(cell)]
+    others = [cell for cell in cells[1:] if cell and not _COUNT.fullmatch(cell)]
+    counts_up = all(b - a == 1 for a, b in itertools.pairwise(counted)) and (not counted or not others)
+    return not _like_number(cells[0]) and counts_up and all(parse_number(cell) is None for cell in others)
+
+
+def _like_number(cell: str) -> bool:
+    """Return whether a cell holds data, even misspelt, and not a name or unit: a header must not swallow a row."""
+    if re.fullmatch(r"1/[^\W\d]+", cell):  # 1/min
+        return False
+    return parse_number(cell) is not None or re.match(r"[+-]?[.,]?\d", cell) is not None
+
+
+def separator_of(line: str, decimal: str) -> str | None:
+    """Return what separates the cells of a line; None for blanks."""
+    for mark in (";", "\t", ","):
+        if mark in line and mark != decimal:
+            return mark
+    return None

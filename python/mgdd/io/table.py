@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.column_names import bare_unit
 from mgdd.io.files import existing_file, read_plain_text
-from mgdd.io.row_text import Rows, cells_of, parse_number
-from mgdd.io.table_head import first_row_of, names_and_units, separator_of, units_filled
+from mgdd.io.row_text import Rows, cells_of, first_row_of, names_and_units, parse_number, separator_of, units_filled
 from mgdd.results.units import unit_of
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})

@@ -13,7 +13,7 @@ from mgdd.errors import DataError
 from mgdd.optimize.inputs import unit_of_input
 from mgdd.results.describe import Row
 from mgdd.results.finding import Finding, findings_html
-from mgdd.results.labels import VARIABLES, labelled_dataset
+from mgdd.results.labels import labelled_dataset, named_label
 from mgdd.results.result import Result
 from mgdd.results.units import unit_of
 from mgdd.surrogate import fit_response
@@ -80,7 +80,9 @@ class FrontResult(Result):
         front = ax.plot(first, second, "o-", color=BLUE, markersize=4, label="front")
         ax.errorbar(first, second, xerr=sd[:, 0], yerr=sd[:, 1], fmt="none", ecolor=BLUE, elinewidth=0.8)
         names = [str(name) for name in self.dataset["objective"].to_numpy()]
-        ax.set(**{f"{axis}label": f"{name} [{_unit(name)}]" for axis, name in zip("xy", names, strict=True)})
+        ax.set(
+            **{f"{axis}label": f"{name} [{named_label(name).units}]" for axis, name in zip("xy", names, strict=True)}
+        )
         legend(ax, [*cloud, *front])
         return ax
 
@@ -240,7 +242,3 @@ def _of_fits(fits: Mapping[str, ResponseFit]) -> list[Finding]:
         for one in fit.findings
         if one.code in own
     ]
-
-
-def _unit(name: str) -> str:
-    return VARIABLES[name].units if name in VARIABLES else unit_of(name)

@@ -24,7 +24,9 @@ def both_sides(limits: Any) -> tuple[Limit, ...]:
         if not isinstance(value, Sequence) or isinstance(value, str):
             sides[name] = value
             continue
-        low, high = (None if _open(each) else each for each in value) if len(value) == 2 else (None, None)
+        low, high = (
+            (None if each in (-math.inf, math.inf) else each for each in value) if len(value) == 2 else (None, None)
+        )
         if not (-math.inf if low is None else low) < (math.inf if high is None else high) or low is high is None:
             raise ParameterError(
                 f"{argument('limits')}: {name} = {value!r}: must be (lower, upper), lower < upper, one may be None"
@@ -32,10 +34,6 @@ def both_sides(limits: Any) -> tuple[Limit, ...]:
         sides |= {} if low is None else {f"{_LOWER}{name}": -low}
         sides |= {} if high is None else {name: high}
     return limits_of(sides)
-
-
-def _open(value: Any) -> bool:
-    return isinstance(value, float) and math.isinf(value)
 
 
 def plain_name(name: str) -> tuple[str, float]:

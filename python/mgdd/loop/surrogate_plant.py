@@ -65,7 +65,7 @@ class SurrogatePlant:
     --------
     >>> from mgdd.loop import SurrogatePlant
     >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.random_steps import random_step_records
+    >>> from mgdd.surrogate.fit import random_step_records
     >>> surrogate = fit_surrogate(random_step_records(1500))
     >>> plant = SurrogatePlant(surrogate, "imep_bar", limits=["mprr"], residuals=False)
     >>> reading = plant.step(-4.0)

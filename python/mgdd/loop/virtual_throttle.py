@@ -90,17 +90,10 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
             "bridge": bridge,
             "seed": seed,
         }
-        super().__init__(
-            throttle=self.throttle,
-            sensors=self._settings["sensors"],
-            faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
-            plant_faults=[fault.to_core() for fault in faults if fault.sensor is None],
-            sample_s=sample_s,
-            step_s=step_s,
-            start_deg=self.start_deg,
-            bridge=bridge,
-            seed=seed,
-        )
+        own = {name: value for name, value in self._settings.items() if name not in ("inputs", "faults")}
+        of_sensors = fault_pair([fault for fault in faults if fault.sensor is not None])
+        of_others = [fault.to_core() for fault in faults if fault.sensor is None]
+        super().__init__(faults=of_sensors, plant_faults=of_others, **own)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self._settings, self.state, self._applied)

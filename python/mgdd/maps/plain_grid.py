@@ -15,8 +15,7 @@ from mgdd.errors import DataError, argument
 from mgdd.io.column_names import spelled_unit
 from mgdd.io.row_text import parse_number
 from mgdd.maps.calibration_map import CalibrationMap
-from mgdd.maps.corner import axes_of
-from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, unit_from, unit_to, without_brackets
+from mgdd.maps.written import NOT_GIVEN, Heading, axes_of, heading_of, unit_from, unit_to, without_brackets
 
 _EMPTY = frozenset({"", "-", "--", "–", "nan", "na", "n/a", "#n/a"})  # how a cell without a value is written
 _MARKS = (";", "\t", ",", None)  # None: blanks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -228,3 +228,12 @@ def draw_run(fit: Fit, ax: Any) -> Any:
     from mgdd.plot.throttle import measured_and_model
 
     return measured_and_model(cast("xr.Dataset", fit.run), ax=ax)
+
+
+def spread_starts(
+    first: Mapping[str, float], box: Sequence[_core.optimize.Parameter], n_starts: int, seed: int
+) -> list[dict[str, float]]:
+    """Give the first start as it is, and further ones from a Latin hypercube between the bounds of the box."""
+    further = _core.optimize.latin_hypercube(box, n_starts - 1, seed) if n_starts > 1 else []
+    names = [parameter.name for parameter in box]
+    return [dict(first), *({**first, **dict(zip(names, point.tolist(), strict=True))} for point in further)]

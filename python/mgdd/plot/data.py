@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.plot.cycle import pressure
+from mgdd.plot.cycles import pressure
 from mgdd.plot.maps import map_cells
-from mgdd.plot.seeking import seeking
-from mgdd.plot.sensors import sensors
+from mgdd.plot.seeking import seeking, sensors
 from mgdd.plot.style import BLACK, axis_label, divide, minus, new_axes, require
-from mgdd.plot.throttle_run import throttle_run
+from mgdd.plot.throttle import throttle_run
 from mgdd.plot.timing import timing
 from mgdd.results.describe import as_figure, rows_of
 from mgdd.results.labels import ANGLE, label_of

@@ -62,7 +62,7 @@ def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = 
     lines += _cuts(cuts, data, names, f"{quantity}\n[{response.units}]")
     for panel in (*panels, *cuts):
         panel.grid(alpha=0.3)
-    legend(ax, _once(lines), columns=1)
+    legend(ax, list({minus(str(line.get_label())): line for line in lines}.values()), columns=1)
     return ax
 
 
@@ -91,10 +91,6 @@ def _cuts(axes: list[Axes], data: xr.Dataset, names: list[str], label: str) -> l
             ax.tick_params(labelleft=False)
         lines = lines or [line, band]
     return lines
-
-
-def _once(lines: list[Artist]) -> list[Artist]:
-    return list({minus(str(line.get_label())): line for line in lines}.values())
 
 
 def _divided(ax: Axes, rows: int, cuts: int) -> tuple[list[Axes], list[Axes]]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from mgdd._rooms import furnish as _furnish
 from mgdd.report.calibration import calibration_report
 from mgdd.report.page import write_report
-from mgdd.report.report import Report
-from mgdd.report.sections import Section, Table
+from mgdd.report.report import Report, Section, Table
 
 __all__ = ["Report", "Section", "Table", "calibration_report", "write_report"]
 

@@ -15,7 +15,7 @@ from mgdd.identify.engine.timing_records import undetermined
 from mgdd.plot.calibration import family_strips
 from mgdd.plot.calibration import wall_heat_profile as draw_profile
 from mgdd.plot.style import drawn, new_figure
-from mgdd.report.sections import Section, Table, as_number
+from mgdd.report.report import Section, Table, as_number
 
 if TYPE_CHECKING:
     import xarray as xr

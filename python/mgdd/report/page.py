@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
 from mgdd.io.files import write_whole_text
-from mgdd.report.sections import as_number
+from mgdd.report.report import as_number
 from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mgdd.report.report import Report
-    from mgdd.report.sections import Section
+    from mgdd.report.report import Report, Section
 
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")

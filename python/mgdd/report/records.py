@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd import plot
 from mgdd.plot.style import drawn
-from mgdd.report.sections import Section, Table, as_number
+from mgdd.report.report import Section, Table, as_number
 from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:

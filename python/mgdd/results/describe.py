@@ -14,7 +14,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import printable
-from mgdd.results.labels import VARIABLES, label_of
+from mgdd.results.labels import label_of, named_label
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -
                 unit = row.unit if shared == "-" or row.value == "–" else shared
                 lines.append(Row(f"{owner}{row.name}", row.value, unit))
         else:
-            unit = (units or {}).get(name) or (VARIABLES[name].units if name in VARIABLES else unit_of(name))
+            unit = (units or {}).get(name) or named_label(name).units
             shown = _shown(value)
             lines.append(Row(name, shown, unit if shown != "–" else "-"))
     return lines

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -66,19 +67,8 @@ def classified(report: _core.optimize.FitReport) -> tuple[Finding, ...]:
         ("null_direction", tuple(name for name, part in zip(names, column, strict=True) if part != 0.0))
         for column in (null.T if null.ndim == 2 else ())
     ]
-    reasons += [("correlated", pair) for pair in _strongest(report, len(sentences) - len(reasons))]
-    return tuple(Finding(code, own, text) for (code, own), text in zip(reasons, sentences, strict=True))
-
-
-def _strongest(report: _core.optimize.FitReport, count: int) -> list[tuple[str, str]]:
-    """Return the `count` most correlated pairs outside the null directions, in the order of the parameters."""
-    c, null = np.asarray(report.correlation), np.asarray(report.null_directions)
-    loose = [bool(np.any(row != 0.0)) for row in np.reshape(null, (len(report.names), -1))]
-    pairs = [
-        (bool(loose[i] or loose[j]), -abs(c[i, j]), i, j)
-        for i in range(len(report.names))
-        for j in range(i + 1, len(report.names))
-        if np.isfinite(c[i, j])
+    reasons += [
+        ("correlated", next(pair for pair in combinations(names, 2) if text.startswith(f"{pair[0]} and {pair[1]}: ")))
+        for text in sentences[len(reasons) :]
     ]
-    strongest = sorted((i, j) for *_, i, j in sorted(pairs)[:count])
-    return [(report.names[i], report.names[j]) for i, j in strongest]
+    return tuple(Finding(code, own, text) for (code, own), text in zip(reasons, sentences, strict=True))

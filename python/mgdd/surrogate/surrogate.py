@@ -55,10 +55,9 @@ def best_along(
         goal = goal + weight * curves[name]
     held = {name: curves[name] - limit for name, limit in limits.items()}
     rules = [leverage, *(-curves[name] for name in nonnegative)]
-    edges = _inner_roots(rules, low, high)
     others = np.delete(np.arange(len(support.inputs)), column)
     inside = np.all((points[0, others] >= support.lower[others]) & (points[0, others] <= support.upper[others]))
-    candidates = np.unique(np.r_[edges, _inner_roots([*held.values(), goal.deriv()], low, high)])
+    candidates = _roots([*rules, *held.values(), goal.deriv()], low, high)
     supported = inside & _within(rules, candidates)
     feasible = supported & _within(list(held.values()), candidates)
     if not feasible.any():
@@ -72,7 +71,9 @@ def best_along(
             "raise a limit"
         )
     best = float(candidates[int(np.argmax(np.where(feasible, goal(candidates), -np.inf)))])
-    start, end = _range_around(best, edges, inside & _within(rules, 0.5 * (edges[1:] + edges[:-1])))
+    before, behind = candidates[:-1], candidates[1:]
+    out = ~(inside & _within(rules, 0.5 * (before + behind)))
+    start, end = behind[out & (behind <= best)].max(initial=low), before[out & (before >= best)].min(initial=high)
     return Optimum(
         inputs={"soi_cad": best},
         objective=" + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items()),
@@ -80,42 +81,22 @@ def best_along(
         values={name: float(curve(best)) for name, curve in curves.items()},
         limits=upper_limits,
         active_limits=tuple(n for n, curve in held.items() if abs(curve(best)) <= _TINY * max(1.0, abs(limits[n]))),
-        at_bound=min(best - start, end - best) <= _TINY * (high - low),
-        bounds={"soi_cad": (start, end)},
+        at_bound=bool(min(best - start, end - best) <= _TINY * (high - low)),
+        bounds={"soi_cad": (float(start), float(end))},
         curvature=float(goal.deriv(2)(best)),
     )
 
 
-def _inner_roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.float64]:
+def _roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.float64]:
     """Return the ends of the range and the real roots between them, sorted."""
-    roots = [low, high]
-    for curve in curves:
-        slope = curve.deriv()
-        for root in curve.trim(_TINY**2 * np.abs(curve.coef).max()).roots():
-            at = float(np.real(root))
-            for _ in range(3):  # Newton: a nearly straight curve spoils the digits of its companion matrix
-                at = at - float(curve(at) / slope(at)) if slope(at) != 0.0 else at
-            if abs(np.imag(root)) < _TINY * (high - low) and low < at < high:
-                roots.append(at)
-    return np.unique(roots)
-
-
-def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the supported interval that holds the best SOI, joined across roots where nothing changes."""
-    first = int(np.searchsorted(edges, best, side="right")) - 1
-    last = int(np.searchsorted(edges, best, side="left"))
-    while first > 0 and supported[first - 1]:
-        first -= 1
-    while last < edges.size - 1 and supported[last]:
-        last += 1
-    return float(edges[first]), float(edges[last])
+    # Of a nearly straight curve the bend is left out: it would spoil the digits of the companion matrix.
+    roots = np.concatenate([curve.trim(_TINY * np.abs(curve.coef).max()).roots() for curve in curves])
+    real = roots.real[np.abs(roots.imag) < _TINY * (high - low)]
+    return np.unique(np.r_[low, high, real[(low < real) & (real < high)]])
 
 
 def _within(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
-    feasible = np.ones(at.size, dtype=np.bool_)
-    for curve in curves:
-        feasible &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())
-    return feasible
+    return np.asarray(np.all([curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max()) for curve in curves], axis=0))
 
 
 STEERED = "soi_cad"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from map_cases import timing_table
-from mgdd.cli import main, output
+from mgdd.cli import main
 from mgdd.cli.map_files import map_blocks
 from mgdd.cli.output import show
 from mgdd.maps import CalibrationMap, write_map
@@ -97,7 +97,6 @@ def test_a_wide_map_is_cut_for_the_terminal(monkeypatch: pytest.MonkeyPatch) -> 
     table = CalibrationMap(axes, -np.arange(60.0).reshape(2, 30) / 7.0, name="soc_cad")
     whole = show(map_blocks(table))
     assert len(whole.splitlines()) == 7
-    monkeypatch.setattr(output, "is_terminal", lambda: True)
     monkeypatch.setattr("mgdd.cli.map_files.is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "80")
     cut = show(map_blocks(table))

@@ -21,7 +21,7 @@ from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrinciple
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.loop import SurrogatePlant
 from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate_throttle
 

@@ -25,7 +25,7 @@ from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 
 SPACE = {"start": -20.0, "bounds": (-30.0, 10.0)}
 SEEDS = range(20)

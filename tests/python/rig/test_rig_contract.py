@@ -16,7 +16,7 @@ from mgdd.rig import CanRig, RecordingRig, ReplayRig, SimulatedRig
 from mgdd.rig.base import Rig
 from mgdd.rig.exchange import RigRecord
 from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 
 pytest.importorskip("can", reason="the extra `can` is not installed")

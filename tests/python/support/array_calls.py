@@ -30,7 +30,7 @@ from mgdd.rig.exchange import RigRecord, flat
 from mgdd.rig.realtime import RingTransport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm
 from realtime_loops import make_loop

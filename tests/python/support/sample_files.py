@@ -33,7 +33,7 @@ from mgdd.rig import (  # fmt: skip
 from mgdd.rig.can.dbc import DbcFile
 from mgdd.rig.exchange import RigRecord  # fmt: skip
 from mgdd.surrogate import ResponseModel, fit_response, fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair
 from recorded_rig import write as write_record

@@ -14,7 +14,7 @@ from mgdd.loop import SurrogatePlant, run_seeker
 from mgdd.optimize import GaussianProcessSeeking, Limit
 from mgdd.results.labels import check_labels
 from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.fit import random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
 AT = {"doi_main_ms": 0.42, "doi_h2_ms": 2.9, "p2m_us": 1200.0}

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from mgdd import _core
 from mgdd.errors import Interrupted
-from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
 from mgdd.identify.throttle.free_run import below_ceiling, draw_free_run, free_run, noise_of, quality_of, source_of
@@ -30,7 +29,7 @@ from mgdd.identify.throttle.whole_delay import (
     whole_delay,
     with_delay,
 )
-from mgdd.optimize.least_squares import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options, spread_starts
 from mgdd.parallel.finished import hand_over
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
@@ -186,7 +185,7 @@ def _structure(
         fits[(GAP,)] = best_of(tries)
         fits[(DROP, GAP)] = hunt.search({**fits[(GAP,)].values, "stribeck_drop": 0.1}, of([DROP, GAP]), _COARSE, 30)
     n = independent_samples(best_of(fits.values()))
-    best = min(fits, key=lambda one: _criterion(fits[one], len(of(one)), n))
+    best = min(fits, key=lambda one: 2.0 * n * math.log(max(fits[one].rmse, FLOOR_DEG)) + len(of(one)) * math.log(n))
     # Sticking makes the cost rough: what the other structures have found are further starts of the chosen one.
     parameters = {name: fits[best].values[name] for term in best for name in term}
     others = [one.values for one in sorted(fits.values(), key=lambda one: one.rmse)[1:3]]
@@ -222,10 +221,6 @@ def _without(hunt: Hunt, search: Search, terms: list[tuple[str, ...]]) -> tuple[
         if not missed(smaller, search, len(term), n):
             search, terms = smaller, [one for one in terms if one != term]
     return search, terms
-
-
-def _criterion(search: Search, size: int, n: float) -> float:
-    return 2.0 * n * math.log(max(search.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
 def _findings(fit: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:

@@ -8,8 +8,8 @@ from typing import Any
 
 from mgdd._core.rig import E2eSettings
 from mgdd.errors import DataError, ParameterError, did_you_mean
-from mgdd.results.labels import VARIABLES
-from mgdd.results.units import attribute_units, unit_of
+from mgdd.results.labels import VARIABLES, named_label
+from mgdd.results.units import attribute_units
 from mgdd.rig.can.dbc import DbcFile, DbcMessage, DbcSignal, near
 from mgdd.rig.can.mapped import GATE_MODES, MappedMessage, MappedSignal, Raw, StateSignal
 from mgdd.rig.can.toml_table import TomlTable
@@ -179,7 +179,7 @@ class MapReader:
         unit = table.take("unit", "text")
         if _plain_unit(unit) != _plain_unit(signal.unit):
             raise table.error("unit", unit, f"{signal.unit!r}, the unit of {signal.name} in {self.dbc.file.name}")
-        own = VARIABLES[name].units if name in VARIABLES else unit_of(name)
+        own = named_label(name).units
         known = name in VARIABLES or own != "-"
         if plain and known and _plain_unit(own) != _plain_unit(unit):
             raise table.error(
