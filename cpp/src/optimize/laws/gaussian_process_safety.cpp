@@ -9,6 +9,8 @@
 namespace mgdd::optimize {
 namespace {
 
+constexpr FailingProcess::Demand not_failing{2.0, 0.0, 0.8}, wary_of_failing{2.0, -0.5, 0.5};  // the latter after one
+
 constexpr double rise_of_limit = 1.2;  // scales per range: sd of its slope before readings, 0.4 of 3 bends
 constexpr double rises_in_room = 2.0, least_step = 0.25;  // sd that a first step leaves room for; of the whole step
 
@@ -40,7 +42,7 @@ void GaussianProcessSeeking::judge_safety(int points, double quantile) noexcept 
   std::fill(mean_over_.begin(), mean_over_.end(), -largest_reading);
   std::fill(credit_.begin(), credit_.end(), 0.0);
   if (failing_.by_input()) {
-    failing_.judge(candidates_, points, since_failure_ < wary_,
+    failing_.judge(candidates_, points, since_failure_ < wary_ ? wary_of_failing : not_failing,
                    [this](double likely, double mean, int p) { judge(likely, mean, p); });
   }
   for (std::size_t i = 0; i < limited_.size(); ++i) {

@@ -217,6 +217,17 @@ const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
 
 // Regret and place by samples of J at the candidates of a cell that keep its limits.
 void MapSeeking::sample(std::size_t c, Best& out) noexcept {
+  if (out.excess > 0.0) {  // nothing is known to be safe: all that J ranges over may be lost
+    const int first = static_cast<int>(c) * per_place;
+    double low = j_.mean(first), high = low;
+    for (int p = first; p < first + per_place; ++p) {
+      low = std::min(low, j_.mean(p));
+      high = std::max(high, j_.mean(p));
+    }
+    out.regret = high - low;
+    out.input_sd = settings_.space.upper - settings_.space.lower;
+    return;
+  }
   const std::span<const int> kept(&safe_[static_cast<std::size_t>(safe_from_[c])],
                                   static_cast<std::size_t>(safe_from_[c + 1] - safe_from_[c]));
   const auto n = static_cast<Eigen::Index>(kept.size());

@@ -15,6 +15,8 @@ constexpr int map_rounds = 6;
 constexpr double map_width = 0.1, map_shrinks = 0.5;  // ranges, per round
 constexpr double likely_quantile = 1.0;               // of what is asked where nothing is safe
 constexpr double reach_beyond_read = 2.0;             // reaches
+// Likely to fail by 3 to 1: cells that were never read are not given up for a failure beside them.
+constexpr FailingProcess::Demand sure_to_fail{0.0, 0.5, 0.0};
 constexpr std::uint64_t draws_per_reading = 1'000'003;
 
 }  // namespace
@@ -49,7 +51,7 @@ void MapSeeking::judge(int points) noexcept {
     }
   }
   if (!failing_.by_input()) return;
-  failing_.judge(candidates_, points, since_failure_ == 0, [this](double likely, double mean, int p) {
+  failing_.judge(candidates_, points, sure_to_fail, [this](double likely, double mean, int p) {
     const auto at = static_cast<std::size_t>(p);
     over_[at] = std::max(over_[at], likely);
     cautious_[at] = std::max(cautious_[at], likely);

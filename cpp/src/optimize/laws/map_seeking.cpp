@@ -220,7 +220,6 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
     place.from = place.best;
   failing_.record(z, !reading.misfire, z);
   failing_.fit(z);
-  since_failure_ = reading.misfire ? 0 : since_failure_ + 1;
   if (reading.misfire) return TellStatus::misfire;
   lowest_ = j_.count() == 0 ? Inputs(z.tail(inputs_)) : lowest_.cwiseMin(z.tail(inputs_));
   highest_ = j_.count() == 0 ? lowest_ : highest_.cwiseMax(z.tail(inputs_));

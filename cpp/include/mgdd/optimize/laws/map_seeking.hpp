@@ -84,7 +84,7 @@ class MapSeeking {
   struct Best {
     Inputs input, input_sd;
     double expected = 0.0, sd = 0.0;  ///< of J there, without the noise of a reading
-    double regret = 0.0;              ///< by which J of the true best is expected to be above
+    double regret = 0.0;  ///< by which J of the true best is expected to be above; its range where none is safe
     double excess = 0.0;  ///< of the worst limit with its probability, in its scale: above 0 where none is safe
   };
 
@@ -118,7 +118,6 @@ class MapSeeking {
     v("readings", self.told_, counts_end);
     v("doubts", self.doubts_, counts_end);
     v("since_doubt", self.since_doubt_, counts_end);
-    v("since_failure", self.since_failure_, counts_end);
     v("lowest", self.lowest_);
     v("highest", self.highest_);
     v("last_context", self.last_context_);
@@ -182,7 +181,7 @@ class MapSeeking {
   std::vector<LimitProcess> limited_;
   FailingProcess failing_;
   Surprise surprise_;
-  std::int64_t told_ = 0, doubts_ = 0, since_doubt_ = 0, since_failure_ = 1;
+  std::int64_t told_ = 0, doubts_ = 0, since_doubt_ = 0;
   std::vector<Place> places_;  // the cells, the last axis fastest, and the point of the last `ask`
   Inputs lowest_, highest_;    // inputs that were read, scaled
   Inputs last_context_;

@@ -26,16 +26,20 @@ class FailingProcess {
   /// Whether cycles have failed, and more likely by their input than anywhere.
   bool by_input() const noexcept { return known() && anywhere_ <= 0.0; }
 
-  /// Predicts at the first `points` rows; `judge(excess, mean, point)` takes by how much a point is likelier to fail
-  /// than may be asked. All of them may fail, as where cycles fail at random: then the least likely ones may be asked.
+  /// Which labels may be asked for: below `most`, that many standard deviations above the mean; or, where all of them
+  /// may fail, as where cycles fail at random, within `room` of the least one.
+  struct Demand {
+    double quantile, most, room;
+  };
+  /// Predicts at the first `points` rows; `judge(excess, mean, point)` takes by how much a point is above the demand.
   template <class Judge>
-  void judge(const InputTable& at, int points, bool wary, const Judge& judge) noexcept {
+  void judge(const InputTable& at, int points, const Demand& demand, const Judge& judge) noexcept {
     model_.predict(at, points);
-    const auto likely = [&](int p) { return model_.mean(p) + quantile * model_.sd(p); };
+    const auto likely = [&](int p) { return model_.mean(p) + demand.quantile * model_.sd(p); };
     double least = largest_reading;
     for (int p = 0; p < points; ++p)
       least = std::min(least, likely(p));
-    const double most = std::max(wary ? wary_failing : most_failing, least + (wary ? wary_room : failing_room));
+    const double most = std::max(demand.most, least + demand.room);
     for (int p = 0; p < points; ++p)
       judge(likely(p) - most, model_.mean(p), p);
   }
@@ -55,9 +59,6 @@ class FailingProcess {
   }
 
  private:
-  static constexpr double quantile = 2.0;                           // of the label
-  static constexpr double most_failing = 0.0, wary_failing = -0.5;  // that is asked for, and after a failure
-  static constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may exceed the least one
   static constexpr double least_anywhere = -3.0;  // a region that fails is to be taken seriously first
   bool known() const noexcept { return seen_one() && model_.count() >= model_.fewest(); }
 
