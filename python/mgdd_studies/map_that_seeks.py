@@ -28,7 +28,7 @@ from mgdd_studies.map_that_seeks_cases import (
     walk,
     walk_of_two,
 )
-from mgdd_studies.map_that_seeks_drives import CYCLES, DRIVEN, MAP, TURNS, WAYS, Driven, drive
+from mgdd_studies.map_that_seeks_drives import CYCLES, DRIVEN, MAP, PROCESS, TURNS, WAYS, Driven, drive
 from mgdd_studies.map_that_seeks_figures import draw
 from mgdd_studies.statistics import with_interval
 
@@ -45,11 +45,12 @@ __all__ = ["run_map_that_seeks"]
 _BASE = Search()
 _BARE = Search(guide=NO_GUIDE, stops=(*STOPS, 48, 64))
 _WORN, _SHORTER = (Search(engine=engine, guide=OLD_MAP) for engine in ("worn", "burn 15 % shorter"))
+_SHORT = STOPS[:-1]
 _OTHERS = ("burn 15 % longer", "compression ratio +1", "compression ratio -1")
 SEARCHES = (
     _BASE, Search(guide="adiabatic"), Search(guide=WRONG_WAY), _BARE,
-    _WORN, _SHORTER, *(Search(engine=engine, guide=OLD_MAP) for engine in _OTHERS), Search(engine="worn"),
-    *(Search(trouble=trouble, stops=STOPS[:-1]) for trouble in TROUBLES),
+    _WORN, _SHORTER, *(Search(engine=engine, guide=OLD_MAP, stops=_SHORT) for engine in _OTHERS),
+    Search(engine="worn", stops=_SHORT), *(Search(trouble=trouble, stops=_SHORT) for trouble in TROUBLES),
 )  # fmt: skip
 QUICK_SEARCHES = (
     Search(stops=(6, 12, 24)), Search(guide=NO_GUIDE, stops=(12, 24)),
@@ -209,7 +210,7 @@ def run_map_that_seeks(
     Parameters
     ----------
     seeds : int
-        Repetitions of everything.
+        Repetitions of everything; of two inputs half as many.
     quick : bool
         One seed, three searches, one design, two guides.
     figures, progress
@@ -245,7 +246,7 @@ def run_map_that_seeks(
     ways = [(f"calibrate, {case.label}", partial(_conventional, case, seeds)) for case in designs]
     ways += [(f"seek per cell, guided {said}", partial(_per_cell, said, seeds)) for said in (False, True)[: 2 - quick]]
     others = [one for group in work(ways) for one in group]
-    two = work([] if quick else [("seek, two inputs", partial(_two_inputs, seeds))])
+    two = work([] if quick else [("seek, two inputs", partial(_two_inputs, -(-seeds // 2)))])
     drives = work((f"drive, {way}, {guide}", partial(_driven, way, guide, seeds)) for guide in guides for way in WAYS)
     return work.finish(
         "map-that-seeks", _dataset(walked, others, drives, seeds), draw if figures else None,
@@ -254,7 +255,7 @@ def run_map_that_seeks(
         unvisited=[unvisited_row(own.search) for own in walked
                    if own.search.guide not in (NO_GUIDE, WRONG_WAY) and not own.search.trouble],
         others=[one.row for one in others],
-        two_inputs=[{"visits": visits, **judgement(lost[:, k], excess[:, k])}
+        two_inputs=[{"visits": visits, "maps": len(lost), **judgement(lost[:, k], excess[:, k])}
                     for lost, excess in two for k, visits in enumerate(PAIR_STOPS)],
         drives=[drive_row(*own) for own in drives],
         bars=bars(walked, two, drives),

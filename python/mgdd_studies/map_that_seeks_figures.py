@@ -50,7 +50,7 @@ def _visits(dataset: xr.Dataset, chosen: np.ndarray, named: str, *, others: bool
             found = np.array([mean_interval(row) for row in dataset[name][at].to_numpy()])
             known = np.isfinite(found[:, 0])
             mean, low, high = found[known].T
-            low = np.maximum(np.where(np.isfinite(low), low, mean), 1e-4)
+            low = np.maximum(np.where(np.isfinite(low), low, mean), 1e-4)  # a mean of few seeds may reach below 0
             high = np.where(np.isfinite(high), high, mean)
             label = minus(str(dataset[named].to_numpy()[at]))
             band(ax, visits[known], low, mean, high, dash=dash, color=color, label=label)
@@ -61,6 +61,7 @@ def _visits(dataset: xr.Dataset, chosen: np.ndarray, named: str, *, others: bool
         ax.set_xticks([6, 8, 12, 16, 24, 32, 64, 128][: 8 if others else 6])
         ax.set_xticklabels([f"{tick:g}" for tick in ax.get_xticks()])
         ax.set_yticks(_TICKS, [f"{tick:g}" for tick in _TICKS])
+        ax.set_ylim(1e-3, 6.0)
         ax.minorticks_off()
         ax.grid(alpha=0.3)
     panels[0].set_ylabel("efficiency lost [points]")
