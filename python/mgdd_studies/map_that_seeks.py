@@ -247,7 +247,10 @@ def run_map_that_seeks(
     ways += [(f"seek per cell, guided {said}", partial(_per_cell, said, seeds)) for said in (False, True)[: 2 - quick]]
     others = [one for group in work(ways) for one in group]
     two = work([] if quick else [("seek, two inputs", partial(_two_inputs, -(-seeds // 2)))])
-    drives = work((f"drive, {way}, {guide}", partial(_driven, way, guide, seeds)) for guide in guides for way in WAYS)
+    drives = work(
+        (f"drive, {way}, {guide}", partial(_driven, way, guide, seeds))
+        for guide in guides for way in WAYS if (way, guide) != (PROCESS, NO_GUIDE)
+    )  # fmt: skip
     return work.finish(
         "map-that-seeks", _dataset(walked, others, drives, seeds), draw if figures else None,
         seeds=seeds,
