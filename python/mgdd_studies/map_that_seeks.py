@@ -125,7 +125,8 @@ def unvisited_row(search: Search) -> dict[str, Any]:
     """Say what the map of the guide alone is worth."""
     truth, timing = truth_of(search.engine), np.atleast_2d(truth_of(search.guide).best_cad)
     return {
-        "engine": search.engine, "guide": search.guide, **judgement(truth.lost(timing), truth.excess(timing)),
+        "engine": search.engine, "guide": search.guide, "visits": 0,
+        **judgement(truth.lost(timing), truth.excess(timing)),
     }  # fmt: skip
 
 
