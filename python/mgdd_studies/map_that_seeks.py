@@ -79,7 +79,7 @@ class Walked:
         """Loss [points] and excess of the cells at a stop, shape (seeds, cells); NaN where the engine fails."""
         timing = np.array([path.timings[stop] for path in self.paths])
         runs = np.array([path.runs for path in self.paths])
-        return tuple(np.where(runs, found, np.nan) for found in (self.truth.lost(timing), self.truth.excess(timing)))  # type: ignore[return-value]
+        return np.where(runs, self.truth.lost(timing), np.nan), np.where(runs, self.truth.excess(timing), np.nan)
 
     def driven(self, visits: int) -> list[Array]:
         """Excess at the first visits, by seed."""
@@ -320,9 +320,11 @@ def bars(
                               [float((excess > _ABOVE).sum(axis=1).mean())], "none", high=0.0))  # fmt: skip
     for way, guide, runs in drives:
         if way == MAP and guide in _DRIVES:
-            lost = float(np.mean([run.lost.mean() for run in runs]))
+            per_cycle = float(np.mean([run.lost.mean() for run in runs]))
             most = _DRIVES[guide]
-            out.append(verdict_on(f"drive, {guide}: loss per cycle [points]", [lost], f"at most {most:g}", high=most))
+            out.append(
+                verdict_on(f"drive, {guide}: loss per cycle [points]", [per_cycle], f"at most {most:g}", high=most)
+            )
             covered = 100.0 * float(np.mean([run.covered for run in runs]))
             out.append(verdict_on(f"drive, {guide}: cells within 1.96 of the stated sd [%]", [covered],
                                   f"at least {_GONE:g}", low=_GONE))  # fmt: skip

@@ -161,8 +161,8 @@ def sought_per_cell(cycles: int, seed: int, *, guided: bool) -> tuple[Array, Arr
     found, driven = [], []
     for number, place in enumerate(zip(*CELLS, strict=True)):
         engine = VirtualEngine(PLANT, point_of(*place), limits=tuple(LIMITS), seed=1000 * seed + number)
-        guide = {"guide": EngineGuide(cylinder=ROUGH)} if guided else {}
-        one = seek(engine, TIMING, limits=LIMITS, cycles=cycles, seed=seed, **guide)
+        guide = EngineGuide(cylinder=ROUGH) if guided else None
+        one = seek(engine, TIMING, limits=LIMITS, cycles=cycles, guide=guide, seed=seed)
         found.append(one.inputs["soc_cad"])
         driven.append(one.run.dataset["applied"].to_numpy()[:, 0])
     return np.array(found), np.array(driven).T

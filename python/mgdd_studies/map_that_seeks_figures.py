@@ -12,6 +12,7 @@ from mgdd_studies.statistics import mean_interval
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["draw"]
@@ -69,7 +70,7 @@ def _visits(dataset: xr.Dataset, chosen: np.ndarray, named: str, *, others: bool
     return figure
 
 
-def _conventional(ax, dataset: xr.Dataset, name: str) -> None:
+def _conventional(ax: Axes, dataset: xr.Dataset, name: str) -> None:
     for said, fill in (("before smoothing", "white"), ("smooth and checked", GREY)):
         ways = [(k, way) for k, way in enumerate(names_of(dataset, "way")) if way.endswith(said)]
         points = [int(way.split()[2]) for _, way in ways]
