@@ -190,7 +190,9 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("guide", _words("guide")),
             ("trouble", _words("trouble")),
             *_MAP,
-            ("cells above a limit by more than 1 %", _number("cells_above", 2)),
+            ("cells above a limit by more than 1 %, of which not named", lambda row: (
+                f"{row['cells_above']:.2f}, {row['unnamed_above']:.2f}"
+            )),
             ("visits above a limit by more than 1 %", _number("visits_above", 2)),
             ("furthest visit above [%]", _number("largest_visit_excess_percent", 1)),
         ),

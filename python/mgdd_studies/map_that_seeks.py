@@ -114,10 +114,12 @@ def _driven_above(excess: Sequence[Array]) -> dict[str, Any]:
 def visit_row(walked: Walked, stop: int) -> dict[str, Any]:
     """Say what the maps of a search are worth after some visits, and what those drove."""
     search, visits = walked.search, walked.search.stops[stop]
+    lost, excess = walked.judged(stop)
+    unnamed = (excess > _ABOVE) & ~np.array([path.named[stop] for path in walked.paths])
     return {
         "engine": search.engine, "guide": search.guide, "trouble": search.trouble or "none", "visits": visits,
-        "engine_cycles": VISIT_CYCLES * visits, **judgement(*walked.judged(stop)),
-        **_driven_above(walked.driven(visits)),
+        "engine_cycles": VISIT_CYCLES * visits, **judgement(lost, excess),
+        "unnamed_above": float(unnamed.sum(axis=1).mean()), **_driven_above(walked.driven(visits)),
     }  # fmt: skip
 
 
@@ -221,9 +223,10 @@ def run_map_that_seeks(
     -------
     StudyResult
         Rows ``engine guide trouble visits engine_cycles lost_percent worst_lost_percent within_01_percent cells_above
-        largest_excess_percent visits_above largest_visit_excess_percent``: efficiency below the best under the limits
-        [points], mean and worst cell; share of maps with every cell within 0.1 points; cells, and visits, above a limit
-        by more than 1 %, and the furthest. ``summary["unvisited"]``: maps of the guides alone.
+        largest_excess_percent unnamed_above visits_above largest_visit_excess_percent``: efficiency below the best
+        under the limits [points], mean and worst cell; share of maps with every cell within 0.1 points; cells, those
+        of them that the finding ``no_safe_input`` does not name, and visits above a limit by more than 1 %, and the
+        furthest. ``summary["unvisited"]``: maps of the guides alone.
         ``summary["others"]``: the other ways. ``summary["two_inputs"]``: timing and intake pressure.
         ``summary["drives"]``: loss per cycle of drives. ``summary["bars"]``: what was demanded.
 

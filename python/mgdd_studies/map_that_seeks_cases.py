@@ -64,6 +64,7 @@ class Path:
     """One search: timings at its stops, and what its visits drove."""
 
     timings: Array  # (stops, cells) [°CA aTDC]
+    named: NDArray[np.bool_]  # (stops, cells), that no input is known to be safe there
     places: NDArray[np.int_]  # (visits,), cells that were visited
     asked: Array  # (visits,) [°CA aTDC]
     runs: NDArray[np.bool_]  # (cells,), where the engine does
@@ -141,6 +142,7 @@ def walk(search: Search, seed: int) -> Path:
     plant = TroubledBed(bed, search.trouble, seed)
     seeker: MapSeeking | None = None
     timings: list[Array] = []
+    named: list[NDArray[np.bool_]] = []
     visits: list[Visit] = []
     for stop in search.stops:
         first = {"limits": LIMITS, "seed": seed, **guide_of(search.guide)}
@@ -149,8 +151,9 @@ def walk(search: Search, seed: int) -> Path:
         seeker = found.seeker
         visits.extend(found.visits)
         timings.append(found.map.values.ravel())
+        named.append(found.cells["excess"].to_numpy().ravel() > 0.0)
     return Path(
-        timings=np.array(timings), places=np.array([_cell_of(visit.at) for visit in visits]),
+        timings=np.array(timings), named=np.array(named), places=np.array([_cell_of(visit.at) for visit in visits]),
         asked=np.array([visit.inputs["soc_cad"] for visit in visits]),
         runs=np.arange(CELLS[0].size) != plant.failing,
     )  # fmt: skip

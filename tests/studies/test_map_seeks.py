@@ -44,8 +44,14 @@ def test_rows_by_hand() -> None:
     early = np.where(cells == 29, truth.free_cad, truth.best_cad)  # held back by a limit there
     asked = np.array([truth.best_cad[3], truth.free_cad[29]])
 
-    def path(timing: Any, failing: int = -1) -> Path:
-        return Path(timings=timing[None], places=np.array([3, 29]), asked=asked, runs=cells != failing)
+    def path(timing: Any, failing: int = -1, named: int = -1) -> Path:
+        return Path(
+            timings=timing[None],
+            named=cells[None] == named,
+            places=np.array([3, 29]),
+            asked=asked,
+            runs=cells != failing,
+        )
 
     search = Search(stops=(2,))
     row = visit_row(Walked(search=search, paths=[path(truth.best_cad), path(late)]), 0)
@@ -57,7 +63,9 @@ def test_rows_by_hand() -> None:
     assert row["cells_above"] == 0.0
     assert row["visits_above"] == 1.0
     assert row["largest_visit_excess_percent"] == pytest.approx(100.0 * float(truth.excess(truth.free_cad)[29]))
-    assert visit_row(Walked(search=search, paths=[path(early)]), 0)["cells_above"] == 1.0
+    for named, left in ((3, 1.0), (29, 0.0)):
+        row = visit_row(Walked(search=search, paths=[path(early, named=named)]), 0)
+        assert (row["cells_above"], row["unnamed_above"]) == (1.0, left)
     # Where the engine does not run nothing is judged.
     spared = Walked(search=search, paths=[path(late, failing=11), path(early, failing=29)])
     assert visit_row(spared, 0)["worst_lost_percent"] < 1e-4
