@@ -80,7 +80,7 @@ def _is_of_noise(row: Row) -> bool:
     return bool(row["sensor"] == "clean" or row["sensor"].endswith("of noise"))
 
 
-_VISITS = (0, 6, 10, 12, 16, 24, 32, 64)  # that a page prints
+_VISITS = (0, 6, 8, 10, 12, 16, 24, 32, 64)  # that a page prints
 # The rows of a table where it has not all of them.
 _ROWS: Mapping[str, Callable[[Row], bool]] = {
     "online-calibration": _is_of_noise,
