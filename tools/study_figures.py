@@ -38,6 +38,10 @@ FIGURES = {
     "study_map_effort.png": ("from-design-to-map", 0, 80),
     "study_map_parts.png": ("from-design-to-map", 1, 80),
     "study_map_drives.png": ("from-design-to-map", 3, 72),
+    "study_map_seeks_visits.png": ("map-that-seeks", 0, 80),
+    "study_map_seeks_changed.png": ("map-that-seeks", 1, 72),
+    "study_map_seeks_map.png": ("map-that-seeks", 2, 72),
+    "study_map_seeks_drives.png": ("map-that-seeks", 3, 72),
 }
 
 

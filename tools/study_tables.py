@@ -64,6 +64,12 @@ _PATH: tuple[Column, ...] = (
     ("loss there [points]", _between("late_lost_percent", 4)),
 )
 
+_MAP: tuple[Column, ...] = (
+    ("loss, mean of the cells [points]", _between("lost_percent", 4)),
+    ("worst cell [points]", _between("worst_lost_percent", 3)),
+    ("every cell within 0.1 points [% of maps]", _number("within_01_percent", 0)),
+)
+
 
 def _error_and_verdict(row: Row) -> str:
     error = f"{_printed(row['error_percent'], 1)} ± {_printed(row['error_sd_percent'], 1)}"
@@ -74,10 +80,12 @@ def _is_of_noise(row: Row) -> bool:
     return bool(row["sensor"] == "clean" or row["sensor"].endswith("of noise"))
 
 
+_VISITS = (0, 6, 8, 10, 12, 16, 24, 32, 64)  # that a page prints
 # The rows of a table where it has not all of them.
 _ROWS: Mapping[str, Callable[[Row], bool]] = {
     "online-calibration": _is_of_noise,
     "calibrated-guide": lambda row: row["tdc_error_cad"] == 0.0,
+    "map-that-seeks": lambda row: row["visits"] == 24,
 }
 # By study: name of the list in its summary, and the columns.
 TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
@@ -176,6 +184,38 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("after [%]", _between("above_after_percent", 1)),
         ),
     },
+    "map-that-seeks": {
+        "rows": (
+            ("engine", _words("engine")),
+            ("guide", _words("guide")),
+            ("trouble", _words("trouble")),
+            *_MAP,
+            ("cells above a limit by more than 1 %, of which not named", lambda row: (
+                f"{row['cells_above']:.2f}, {row['unnamed_above']:.2f}"
+            )),
+            ("visits above a limit by more than 1 %", _number("visits_above", 2)),
+            ("furthest visit above [%]", _number("largest_visit_excess_percent", 1)),
+        ),
+        "others": (
+            ("way to a map", _words("way")),
+            ("engine cycles", _number("engine_cycles", 0)),
+            *_MAP,
+            ("measured points or cycles above a limit", _number("driven_above", 1)),
+        ),
+        "two_inputs": (
+            ("visits, timing and intake pressure", _number("visits", 0)),
+            *_MAP,
+            ("cells above a limit by more than 1 %", _number("cells_above", 2)),
+        ),
+        "drives": (
+            ("guide", _words("guide")),
+            ("timing from", _words("way")),
+            ("loss per cycle [points]", _between("lost_percent", 3)),
+            ("first turn", _between("first_turn_percent", 3)),
+            ("second turn", _between("second_turn_percent", 3)),
+            ("cells within 1.96 of the stated standard deviation [%]", _number("covered_percent", 0)),
+        ),
+    },
     "throttle-tracking": {
         "rows": (
             ("preset", _words("preset")),
@@ -213,6 +253,8 @@ def tables(name: str, summary: Mapping[str, Any]) -> dict[str, list[str]]:
         out["errors"] = _errors(summary["rows"])
     elif name == "calibrated-guide":
         out["settings"] = _settings(summary["settings"])
+    elif name == "map-that-seeks":
+        out |= _by_visits(summary["rows"], summary["unvisited"])
     return out
 
 
@@ -239,7 +281,7 @@ def _side_by_side(
     cells = {(row[below], beside(row)): cell(row) for row in rows}
     lines = [[head, *columns], ["---"] * (1 + len(columns))]
     lines += [
-        [label.replace("CAD", "°CA"), *(cells[label, column] for column in columns)]
+        [label.replace("CAD", "°CA"), *(cells.get((label, column), "") for column in columns)]
         for label in dict.fromkeys(row[below] for row in rows)
     ]
     return [f"| {' | '.join(line)} |" for line in lines]
@@ -261,6 +303,25 @@ def _settings(rows: Sequence[Row]) -> list[str]:
     return _side_by_side(
         rows, "calibrated", "calibrated", lambda row: f"{row['engine']}, from {row['start_cad']:g}", cell
     )
+
+
+def _by_visits(rows: Sequence[Row], unvisited: Sequence[Row]) -> dict[str, list[str]]:
+    """Loss over the visits, mean of the cells and its interval, then the worst cell; the guide alone at none."""
+
+    def cell(row: Row) -> str:
+        return f"{_between('lost_percent', 3)(row)}; {_number('worst_lost_percent', 2)(row)}"
+
+    every = [row for row in (*unvisited, *rows) if row.get("trouble", "none") == "none" and row["visits"] in _VISITS]
+    every.sort(key=lambda row: row["visits"])
+    own = [row for row in every if row["engine"] == "as calibrated"]
+    changed = [row for row in every if row["engine"] != "as calibrated"]
+    return {
+        "visits": _side_by_side(own, "guide, points visited", "guide", lambda row: f"{row['visits']}", cell),
+        "changed": _side_by_side(
+            [{**row, "engine": f"{row['engine']}, {row['guide']}"} for row in changed], "engine, guide, points visited",
+            "engine", lambda row: f"{row['visits']}", cell,
+        ),
+    }  # fmt: skip
 
 
 def put_into(page: str, name: str, summary: Mapping[str, Any]) -> str:

@@ -40,6 +40,9 @@ STUDIES: Mapping[str, Study] = {
     "from-design-to-map": Study(
         "a timing map by design of experiments: its cost, its losses, other engines, and what a guide makes of it", 2
     ),
+    "map-that-seeks": Study(
+        "a timing map by one search led by a rough model: visits, losses, changed engines, trouble, and drives"
+    ),
     "torque-demand": Study("how far the torque follows the pedal through the throttle, and causes of the error", 2),
     "throttle-first-principle": Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7

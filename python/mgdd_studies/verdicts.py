@@ -87,6 +87,10 @@ _SAID: Mapping[str, tuple[_Range | _Share, ...]] = {
         _Range("loss in the cells of the map", "lost_percent", ("way",), "%"),
         _Range("cost of the map", "cycles", ("way",), "cycles"),
     ),
+    "map-that-seeks": (
+        _Range("loss in the cells of the map", "lost_percent", ("engine", "guide", "visits"), "points"),
+        _Range("loss of a drive per cycle", "lost_percent", ("way", "guide"), "points", rows="drives"),
+    ),
     "torque-demand": (_Range("torque error, RMS", "torque_rms_nm", ("case",), "N m"),),
     "throttle-first-principle": (
         _Range("error of an identified group", "error_percent", ("case", "group"), "%"),
