@@ -198,7 +198,7 @@ def _driven(way: str, guide: str, seeds: int) -> tuple[str, str, list[Driven]]:
 
 
 def run_map_that_seeks(
-    *, seeds: int = 30, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, n_seeds: int = 30, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Seek a whole map by one search led by a model, on engines that are and are not as the model says.
 
@@ -212,7 +212,7 @@ def run_map_that_seeks(
 
     Parameters
     ----------
-    seeds : int
+    n_seeds : int
         Repetitions of everything; of two inputs half as many.
     quick : bool
         One seed, three searches, one design, two guides.
@@ -238,11 +238,11 @@ def run_map_that_seeks(
     Examples
     --------
     >>> from mgdd_studies.map_that_seeks import run_map_that_seeks
-    >>> rows = run_map_that_seeks(seeds=1, quick=True, figures=False).summary["rows"]
+    >>> rows = run_map_that_seeks(n_seeds=1, quick=True, figures=False).summary["rows"]
     >>> [row["visits"] for row in rows if row["guide"] == "twice the wall heat" and row["worst_lost_percent"] < 0.1]
     [6, 12, 24]
     """
-    seeds = check_seeds(seeds, quick=quick)
+    seeds = check_seeds(n_seeds, quick=quick)
     work = Parts(progress)
     searches, designs = (QUICK_SEARCHES, CONVENTIONAL[:1]) if quick else (SEARCHES, CONVENTIONAL)
     guides = DRIVEN[1::3] if quick else DRIVEN

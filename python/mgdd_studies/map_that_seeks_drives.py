@@ -88,7 +88,7 @@ def drive(way: str, guide: str, seed: int) -> Driven:
         search = MapSeeking(TIMING, AXES, seed=seed, **own)
         seeker = search.driver()
     elif way == PROCESS:
-        process = GaussianProcessSeeking(start=0.5 * (_LOW + _HIGH), lower=_LOW, upper=_HIGH, seed=seed)
+        process = GaussianProcessSeeking(start=0.5 * (_LOW + _HIGH), bounds=(_LOW, _HIGH), seed=seed)
         seeker = FeedForward(process, None if guide == NO_GUIDE else model.best)
     elif model.optimum is not None and not model.backwards:
         seeker = GuidedEngine(curve_seeker(model.curve(points[0])), model.optimum, points[0])

@@ -297,7 +297,7 @@ def _searched(
         while seeker.readings < visits:
             suggestion = seeker.suggest()
             if hasattr(plant, "begin"):
-                plant.begin(len(made))
+                plant.begin(seeker.readings)
             visit = _visited(plant, seeker, dwell, suggestion.at, suggestion.inputs, suggestion.sd)
             _tell(seeker, visit)
             made.append(visit)

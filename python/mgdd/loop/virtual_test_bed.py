@@ -98,7 +98,7 @@ class VirtualTestBed:
         own = {name: float(numbers[name]) for name in self._axes}
         return self._point(**own) if self._point else self._base.replace(**own)
 
-    def require_cells(self, axes: Mapping[str, ArrayLike]) -> None:
+    def require_cells(self, axes: Mapping[str, Any]) -> None:
         """ParameterError where the engine does not run in some cell of these axes."""
         for numbers in itertools.product(*(np.asarray(column, np.float64).tolist() for column in axes.values())):
             at = dict(zip(axes, numbers, strict=True))

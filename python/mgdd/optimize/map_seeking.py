@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError, argument
+from mgdd.errors import DataError, Error, ParameterError, ShapeError, argument
 from mgdd.io.files import write_whole_text
 from mgdd.optimize.inputs import inputs_of, named_values, unit_of_input
 from mgdd.optimize.optimum import limits_of
@@ -316,7 +316,10 @@ class MapSeeking(_core.optimize.MapSeeking):
         kind, settings, state = read_saved(path)
         if kind != "MapSeeking":
             raise DataError(f"{os.fspath(path)}: holds a {kind}, not a MapSeeking")
-        made: Self = _remade(cls, settings, state)
+        try:
+            made: Self = _remade(cls, settings, state)
+        except (Error, TypeError, KeyError) as error:
+            raise DataError(f"{os.fspath(path)}: settings and state do not make a MapSeeking: {error}") from error
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -20,7 +20,7 @@ from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import read_conditions, read_points
 from mgdd.loop import Reference
 from mgdd.maps import CalibrationMap, read_dcm, read_map, write_map
-from mgdd.optimize import GradientDescent, Limit, Seeker
+from mgdd.optimize import GradientDescent, Limit, MapSeeking, Seeker
 from mgdd.rig import (  # fmt: skip
     Experiment,
     Recorder,
@@ -85,6 +85,12 @@ def _log(path: Path) -> None:
     time = np.arange(80) * 0.01
     rows = zip(time, 0.3 * np.sin(9.0 * time), 25.0 + 15.0 * np.sin(9.0 * time - 0.5), strict=True)
     _write(path, "time_s,duty,angle_deg\n" + "".join(f"{t:.2f},{u:.4f},{a:.3f}\n" for t, u, a in rows))
+
+
+def _map_search(path: Path) -> None:
+    search = MapSeeking({"soc_cad": (-20.0, 5.0)}, {"fuel_mg": [10.0, 20.0]}, limits={"p_max_bar": 95.0})
+    search.tell({"fuel_mg": 12.0}, {"soc_cad": -3.0}, 41.0, [80.0])
+    search.save(path)
 
 
 def _seeker(path: Path) -> None:
@@ -160,6 +166,7 @@ SAMPLES: dict[str, Sample] = {
     "maps.read_dcm cdfx": Sample(read_dcm, "cdfx", _dcm),
     "maps.read_map grid": Sample(read_map, "csv", _text(GRID)),
     "maps.read_map points": Sample(read_map, "csv", _text(POINTS)),
+    "optimize.MapSeeking.load": Sample(MapSeeking.load, "json", _map_search),
     "optimize.Seeker.load": Sample(Seeker.load, "json", _seeker),
     "identify.load_throttle_model": Sample(
         load_throttle_model, "toml", lambda path: _write(path, FirstPrincipleModel().to_toml())

@@ -13,6 +13,7 @@
 namespace mgdd::optimize {
 namespace {
 
+constexpr double by_chance = 0.1;   // of the visits fail
 constexpr double promising = 2.0;   // standard deviations
 constexpr double first_room = 0.1;  // scales of a limit that a guide leaves free at the first visit
 constexpr int first_draws = 400;
@@ -156,10 +157,11 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
   for (std::size_t c = 0; c < cells(); ++c) {
     std::array<int, most_visits> visits{};
     const int count = visits_of(c, visits);
+    const double works = std::pow(by_chance, failures_[c]);  // that a cell which has failed so often does
     const bool elsewhere = (cell(c) - last_context_).cwiseAbs().maxCoeff() > 0.0;
     for (int k = 0; k < count; ++k) {
       const int p = visits[static_cast<std::size_t>(k)];
-      const double gain = gain_of(p), worth = elsewhere ? gain / (1.0 + settings_.moving_cost) : gain;
+      const double gain = gain_of(p), worth = works * (elsewhere ? gain / (1.0 + settings_.moving_cost) : gain);
       if (worth <= most) continue;
       most = worth;
       next = p;

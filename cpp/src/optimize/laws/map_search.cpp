@@ -72,8 +72,8 @@ void MapSeeking::keep_best(Place& place, int from, int count) noexcept {
   place.excess = over_[static_cast<std::size_t>(best)];
 }
 
-// Of every place its best input, some from everywhere, and so many around the best at distances of all sizes.
-void MapSeeking::scatter(std::span<const Place> places, int around) noexcept {
+// Of every place its best input, some from everywhere, and a cloud around the best at distances of all sizes.
+void MapSeeking::scatter(std::span<const Place> places) noexcept {
   int row = 0;
   for (const Place& place : places) {
     put(row++, place.context, place.best);
@@ -84,8 +84,8 @@ void MapSeeking::scatter(std::span<const Place> places, int around) noexcept {
       z[0] = (p + z[0]) / spread;
       put(row, place.context, z);
     }
-    for (int p = 0; p < around; ++p, ++row) {
-      const double distance = cloud_nearest * std::pow(cloud_farthest / cloud_nearest, (p + 0.5) / around);
+    for (int p = 0; p < near; ++p, ++row) {
+      const double distance = cloud_nearest * std::pow(cloud_farthest / cloud_nearest, (p + 0.5) / near);
       Inputs z = place.best;
       for (Eigen::Index i = 0; i < inputs_; ++i)
         z[i] += distance * normal(410 + static_cast<std::uint64_t>(i), row);
@@ -99,11 +99,11 @@ void MapSeeking::scatter(std::span<const Place> places, int around) noexcept {
 void MapSeeking::search(std::span<Place> places) noexcept {
   for (Place& place : places)
     place.best = place.from;
-  scatter(places, 0);
+  scatter(places);
   int from = 0;
   for (Place& place : places) {
-    keep_best(place, from, 1 + spread);
-    from += 1 + spread;
+    keep_best(place, from, per_place);
+    from += per_place;
   }
   double width = map_width;
   for (int round = 0; round < map_rounds; ++round, width *= map_shrinks) {
@@ -127,7 +127,7 @@ void MapSeeking::search(std::span<Place> places) noexcept {
     }
   }
   know_edges(places);
-  scatter(places, near);
+  scatter(places);
   choose_safe(places);
 }
 
@@ -188,13 +188,17 @@ void MapSeeking::choose_safe(std::span<const Place> places) noexcept {
   safe_from_[places.size()] = count;
 }
 
-// Whether a candidate may be asked; with limits not far from what was read, nor from the best of its place.
+// Whether a candidate may be asked; with limits not far from what was read, and near the best of its place or on the
+// way to it.
 bool MapSeeking::safe(int point, const Place& place) const noexcept {
   if (cautious_[static_cast<std::size_t>(point)] > 0.0) return false;
   if (limited_.empty()) return true;
+  const double beyond = reach_beyond_read * settings_.reach;
+  const Inputs low = lowest_.array() - beyond, high = highest_.array() + beyond;
   const Inputs z = candidates_.row(point).tail(inputs_).transpose();
-  const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
-  return beyond <= reach_beyond_read * settings_.reach && (z - place.best).cwiseAbs().maxCoeff() <= settings_.reach;
+  const Inputs towards = place.best.cwiseMax(low).cwiseMin(high);
+  return (z - low).minCoeff() >= 0.0 && (high - z).minCoeff() >= 0.0 &&
+         (z - towards).cwiseAbs().maxCoeff() <= settings_.reach;
 }
 
 // Where nothing is safe: not far from what was read, the one that most likely keeps its limits.

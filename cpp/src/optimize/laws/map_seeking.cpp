@@ -143,6 +143,7 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
       limited_(map_limit_processes(settings_, points_of(settings_, per_place))),
       failing_(map_process_settings(settings_, points_of(settings_, per_place))),
       places_(count_of(settings_.axes) + 1),
+      failures_(cells(), 0.0),
       lowest_(scaled(settings_.space.start)),
       highest_(lowest_),
       last_context_(Inputs::Zero(context_)),
@@ -218,6 +219,9 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
   searched_ = false;
   for (Place& place : places_)
     place.from = place.best;
+  for (std::size_t c = 0; c < cells(); ++c) {
+    if (cell(c) == context) failures_[c] = reading.misfire ? failures_[c] + 1.0 : 0.0;
+  }
   failing_.record(z, !reading.misfire, z);
   failing_.fit(z);
   if (reading.misfire) return TellStatus::misfire;
@@ -251,6 +255,8 @@ void MapSeeking::reseed(std::uint64_t seed) noexcept {
 
 void MapSeeking::require_usable() const {
   failing_.require_usable();
+  for (const double failures : failures_)
+    require_in(closed(0.0, 1e12), "failures", failures);
   for (const Place& place : places_) {
     for (const double entry : place.from)
       require_in(closed(0.0, 1.0), "place", entry);

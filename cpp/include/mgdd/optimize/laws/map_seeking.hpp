@@ -118,6 +118,7 @@ class MapSeeking {
     v("readings", self.told_, counts_end);
     v("doubts", self.doubts_, counts_end);
     v("since_doubt", self.since_doubt_, counts_end);
+    v("failures", self.failures_);
     v("lowest", self.lowest_);
     v("highest", self.highest_);
     v("last_context", self.last_context_);
@@ -160,7 +161,7 @@ class MapSeeking {
   void judge(int points) noexcept;
   bool safe(int point, const Place& place) const noexcept;
   bool known() const noexcept;
-  void scatter(std::span<const Place> places, int around) noexcept;
+  void scatter(std::span<const Place> places) noexcept;
   void keep_best(Place& place, int from, int count) noexcept;
   void search(std::span<Place> places) noexcept;
   void know_cells() noexcept;
@@ -182,8 +183,9 @@ class MapSeeking {
   FailingProcess failing_;
   Surprise surprise_;
   std::int64_t told_ = 0, doubts_ = 0, since_doubt_ = 0;
-  std::vector<Place> places_;  // the cells, the last axis fastest, and the point of the last `ask`
-  Inputs lowest_, highest_;    // inputs that were read, scaled
+  std::vector<Place> places_;     // the cells, the last axis fastest, and the point of the last `ask`
+  std::vector<double> failures_;  // of the last readings of each cell, in a row
+  Inputs lowest_, highest_;       // inputs that were read, scaled
   Inputs last_context_;
   bool searched_ = false;  // what is known of the cells is that of all readings
   Visit visit_;
