@@ -155,6 +155,7 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
   double most = -1.0;
   int next = -1;
   for (std::size_t c = 0; c < cells(); ++c) {
+    if (failures_[c] >= given_up) continue;
     std::array<int, most_visits> visits{};
     const int count = visits_of(c, visits);
     const double works = std::pow(by_chance, failures_[c]);  // that a cell which has failed so often does

@@ -209,6 +209,7 @@ int MapSeeking::least_unsafe(std::span<const Place> places) const noexcept {
     const Inputs z = candidates_.row(p).tail(inputs_).transpose();
     const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
     const double own = mean_over_[static_cast<std::size_t>(p)];
+    if (places.size() == cells() && failures_[static_cast<std::size_t>(p / per_place)] >= given_up) continue;
     if (beyond > reach_beyond_read * settings_.reach || own >= least) continue;
     least = own;
     best = p;

@@ -143,6 +143,7 @@ class MapSeeking {
  private:
   static constexpr int spread = 20, near = 20, per_place = 1 + spread + near, cloud = 9;
   static constexpr int most_visits = 8;        // of a cell, that are compared
+  static constexpr double given_up = 3.0;      // failures of a cell in a row, then it is left alone
   static constexpr double active_room = 0.02;  // scales of a limit
 
   struct Place {
