@@ -28,7 +28,7 @@ from mgdd.parallel.pool import cores, processes
 from mgdd.results.labels import check_labels
 from mgdd.throttle import Throttle
 
-SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+SPACE = {"start": -12.0, "bounds": (-30.0, 10.0)}
 
 
 def loops(**how: Any) -> xr.Dataset:
@@ -180,7 +180,7 @@ def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> No
         from mgdd.throttle import Throttle
 
         def loops(**how):
-            seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+            seeker = ExtremumSeeking(start=-12.0, bounds=(-30.0, 10.0))
             return monte_carlo(VirtualEngine(), seeker, range(20_000), cycles=1000, **how), "mean_soc_cad"
 
         def tracks(**how):
