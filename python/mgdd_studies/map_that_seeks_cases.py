@@ -108,15 +108,19 @@ class TroubledBed:
     def __init__(self, bed: VirtualTestBed, trouble: str, seed: int) -> None:
         draw = np.random.default_rng([seed, 55])
         self.input_names, self.limit_names = bed.input_names, bed.limit_names
-        self._bed, self._trouble, self._visit = bed, trouble, -1
+        self._bed, self._trouble, self._visit = bed, trouble, 0
         lies = enumerate(draw.integers(_EVERY, size=8).tolist())
         self._lies = {_EVERY * k + at: float(draw.choice([-1.0, 1.0])) for k, at in lies}
         self.failing = int(draw.integers(CELLS[0].size)) if trouble == _FAILS else -1
         self._fails = False
 
+    def begin(self, visit: int) -> None:
+        """Say that a visit with this number begins: drift and outliers count visits, not cycles."""
+        self._visit = visit
+        self._bed.begin(visit)
+
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Begin a visit."""
-        self._visit += 1
+        """Set operating point and timing of the next cycle."""
         self._fails = _cell_of(inputs) == self.failing
         self._bed.apply(inputs)
 

@@ -90,7 +90,7 @@ def _seek(args: argparse.Namespace) -> None:
                 raise
             found, interrupted = stop.partial, True
             if not found.visits:
-                raise Stopped("no visit was finished, so there is no map") from stop
+                raise Stopped("interrupted before the first visit was finished: nothing to keep") from stop
     warn(*found.findings)
     maps = list(found.maps.values())
     payload = found.to_dict() | {"interrupted": interrupted, "preset": preset, "sensor": args.sensor}

@@ -65,7 +65,8 @@ class Progress:
     """Say what a command is doing, from its start to its end, whether it reports steps or not.
 
     A long step in the core shows too: a thread speaks, not the step. How many steps there will be is often known only
-    at the end: `expect` says where the bar starts from. A stream that is no terminal hears every `interval_s` seconds.
+    at the end: `expect` says where the bar starts from. A stream that is not a terminal gets a line every `interval_s`
+    seconds.
     """
 
     def __init__(self, *, quiet: bool, stream: TextIO | None = None, interval_s: float = _INTERVAL_S) -> None:

@@ -18,7 +18,7 @@ from mgdd.identify.ode_model import OdeModel
 from mgdd.identify.throttle.excitation import check_excitation, design_excitation
 from mgdd.identify.throttle.fits import load_throttle_model
 from mgdd.identify.throttle.identify import identify_throttle
-from mgdd.identify.throttle.pseudo_wiener_fit import OnlineUpdate
+from mgdd.identify.throttle.online_update import OnlineUpdate
 from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [

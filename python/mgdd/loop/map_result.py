@@ -14,7 +14,7 @@ from mgdd.loop.lower_limits import plain_name
 from mgdd.maps import CalibrationMap
 from mgdd.maps.cells import MapTask
 from mgdd.optimize.inputs import unit_of_input
-from mgdd.optimize.map_seeking import nearest_cell
+from mgdd.optimize.map_driver import nearest_cell
 from mgdd.results.describe import Row
 from mgdd.results.finding import Finding, findings_html
 from mgdd.results.labels import labelled_dataset, named_label
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from mgdd.optimize.map_seeking import MapDriver, MapSeeking
+    from mgdd.optimize.map_driver import MapDriver
+    from mgdd.optimize.map_seeking import MapSeeking
 
 _NOTHING = 0.3  # share of the guide below which it explains as good as nothing
 _HELD = 0.02  # shares of a limit: nearer than that it holds the cell back
@@ -71,7 +72,7 @@ class MapSearch(Result):
     findings : tuple of Finding
         Reasons to doubt the map.
     seeker : MapSeeking
-        Goes on where the search ended: ``seek_map(plant, ..., seeker=found.seeker)``, or ``seeker.ask(point)`` as the
+        Goes on where the search ended: ``seek_map(plant, ..., seeker=found)``, or ``seeker.ask(point)`` as the
         engine is driven; `driven` then gives the map.
     """
 

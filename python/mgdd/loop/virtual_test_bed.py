@@ -73,7 +73,7 @@ class VirtualTestBed:
         for name in self._axes:
             if name not in known:
                 raise ParameterError(
-                    hinted(f"{argument('axes')}: {name!r} is no number of an operating point", name, known)
+                    hinted(f"{argument('axes')}: {name!r} is not a number of an operating point", name, known)
                 )
         self._point = point if callable(point) else None
         given = None if callable(point) else point
@@ -139,7 +139,7 @@ class VirtualTestBed:
         return dataclasses.replace(measured, applied={**at, **measured.applied})
 
     def steady(self, columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
-        """Give J and limits without noise, each sensor settled, at columns of all inputs; NaN where there is no cycle.
+        """Give J and limits without noise, each sensor settled, at columns of all inputs; NaN where no cycle runs.
 
         Parameters
         ----------

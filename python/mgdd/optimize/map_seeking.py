@@ -14,6 +14,7 @@ from mgdd import _core
 from mgdd.errors import DataError, Error, ParameterError, ShapeError, argument
 from mgdd.io.files import write_whole_text
 from mgdd.optimize.inputs import inputs_of, named_values, unit_of_input
+from mgdd.optimize.map_driver import MapDriver
 from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.process_seeking import surface_of
 from mgdd.optimize.seeker import encoded, read_saved
@@ -149,8 +150,7 @@ class MapSeeking(_core.optimize.MapSeeking):
             if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
                 raise ParameterError(f"inputs: {one.name} = ({one.lower:g}, {one.upper:g}): give finite bounds")
         kept = limits_of(limits)
-        nodes = [np.linspace(one.lower, one.upper, _NODES.get(len(names), 5)) for one in sought]
-        over = {**entries, **dict(zip(names, nodes, strict=True))}
+        over = {**entries, **input_nodes(sought)}
         given: dict[str, Any] = {}
         if guide is not None:
             given["guide"] = [surface_of(guide, list(over), list(over.values()), argument="guide")]
@@ -340,96 +340,10 @@ class MapSeeking(_core.optimize.MapSeeking):
         return np.array(numbers)
 
 
-class MapDriver:
-    """A search for a map as the seeker of a driven engine: ``seek(engine, inputs, seeker=search.driver())``.
-
-    At each operating point it asks for what is worth most there, and what is read teaches the whole map. Outside of the
-    axes the nearest point is asked for and nothing is learnt.
-
-    Parameters
-    ----------
-    search : MapSeeking
-        Changes as the engine runs.
-
-    Attributes
-    ----------
-    readings : numpy.ndarray
-        How many it has learnt from, by their nearest cell.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import MapSeeking
-    >>> search = MapSeeking({"x": (-5.0, 5.0)}, {"load": [0.0, 1.0]})
-    >>> driver = search.driver()
-    >>> for k in range(40):
-    ...     load = k // 20 * 0.5
-    ...     driver.at({"load": load})
-    ...     driver.tell(-((driver.ask()[0] - 2.0 * load) ** 2))
-    >>> bool(abs(driver.estimate[0] - 1.0) < 0.1)
-    True
-    """
-
-    def __init__(self, search: MapSeeking) -> None:
-        self.search = search
-        self.readings = np.zeros(tuple(column.size for column in search.axes.values()))
-        self._bounds = {one.name: (one.lower, one.upper) for one in search.settings["context"]}
-        self._point: dict[str, float] | None = None
-        self._outside = False
-        self._asked: dict[str, float] | None = None
-
-    def at(self, point: Any) -> None:
-        """Say at which operating point the next cycle runs: numbers by name, or an object that has them."""
-        own = {}
-        for name in self._bounds:
-            value = point.get(name) if isinstance(point, Mapping) else getattr(point, name, None)
-            if value is None or not math.isfinite(value):
-                raise ParameterError(f"point: {name} = {value!r}: must be a number, as the axes of the map are")
-            own[name] = float(value)
-        held = {name: min(max(own[name], low), high) for name, (low, high) in self._bounds.items()}
-        self._outside, self._asked = held != own, None if held != self._point else self._asked
-        self._point = held
-
-    @property
-    def estimate(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """The best inputs at this point, as they are known now."""
-        if self._point is not None and self._asked is None:
-            self.ask()
-        return np.asarray(self.search._estimate)
-
-    def ask(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Give the inputs of the next cycle, in their order; ParameterError before `at`."""
-        if self._point is None:
-            raise ParameterError("ask() before at(point): the operating point is not known")
-        if self._asked is None:
-            self._asked = self.search.ask(self._point)
-        return np.array(list(self._asked.values()))
-
-    def tell(
-        self,
-        J: float,  # noqa: N803
-        limits: Any = None,
-        *,
-        misfire: bool = False,
-        applied: Any = None,
-    ) -> None:
-        """Accept what was read in this cycle; as any seeker of one's own it maximises, the search as it was made."""
-        names = self.search.input_names
-        if not self.search.settings["maximize"]:
-            J = -J  # noqa: N806
-        asked = self.ask() if applied is None else np.asarray(applied, np.float64)
-        inputs = dict(zip(names, asked.tolist(), strict=True))
-        if self._outside:
-            self._asked = None
-            return
-        assert self._point is not None  # noqa: S101 - ask() has refused it
-        self.search.tell(self._point, inputs, None if misfire else J, limits, misfire=misfire)
-        self.readings[nearest_cell(self.search.axes, self._point)] += 1.0
-        self._asked = None
-
-
-def nearest_cell(axes: Mapping[str, ArrayLike], at: Mapping[str, float]) -> tuple[int, ...]:
-    """Give the place of the cell that is nearest to a point on every axis."""
-    return tuple(int(np.argmin(np.abs(np.asarray(column) - at[name]))) for name, column in axes.items())
+def input_nodes(inputs: Sequence[Input]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """Give the values of every input at which a guide is asked."""
+    count = _NODES.get(len(inputs), 5)
+    return {one.name: np.linspace(one.lower, one.upper, count) for one in inputs}
 
 
 def entries_of(axes: Any, inputs: Sequence[str]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:

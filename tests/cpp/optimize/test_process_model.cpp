@@ -8,6 +8,7 @@
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/belief/process_model.hpp"
+#include "mgdd/optimize/laws/most_worth.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -62,7 +62,7 @@ def test_two_inputs_are_two_labels_of_one_file(tmp_path: Path, capsys: Capsys) -
     [
         ("", "--over is given 0 times: a map has one axis or two"),
         ("--over speed_rpm=1000:2000", "write NAME=LOW:HIGH:N"),
-        ("--over speed=1:2:2", "--over: 'speed' is no number of an operating point; did you mean 'speed_rpm'"),
+        ("--over speed=1:2:2", "--over: 'speed' is not a number of an operating point; did you mean 'speed_rpm'"),
         ("--over speed_rpm=2000,1000", "--over of speed_rpm = [2000.0, 1000.0]: must be two entries at least"),
         ("--over fuel_mg=0,20", "--over at fuel_mg = 0: "),
         ("--over speed_rpm=1000,2000 --speed-rpm 900", "speed_rpm is an axis, --over, and a number of the point"),

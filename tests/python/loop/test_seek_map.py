@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from pathlib import Path
@@ -125,16 +126,26 @@ def test_a_record_goes_on_as_if_it_had_never_stopped(tmp_path: Path) -> None:
     assert again.cells.identical(whole.cells)
     replayed = seek_map(SparkEngine(99, ends_after=0), SPARK, AXES, visits=9, seed=3, record=file, **GUIDED)
     assert replayed.cells.identical(whole.cells)
-    for other, what in (({"seed": 4}, "another search"), ({"limits": {}, "limit_guides": None}, "columns")):
-        with pytest.raises(DataError, match=what):
+    for other in ({"seed": 4}, {"limits": {}, "limit_guides": None}, {"guide": torque}):
+        with pytest.raises(DataError, match="another search"):
             seek_map(SparkEngine(3), SPARK, AXES, visits=12, record=file, **{**GUIDED, "seed": 3, **other})
+    rows = file.read_text(encoding="utf-8").splitlines()
+    for edited, what in (("9" + rows[4][1:], "another point"), (rows[4] + ",1.0", "must be 7 numbers")):
+        file.write_text("\n".join([*rows[:4], edited, ""]), encoding="utf-8")
+        with pytest.raises(DataError, match=what):
+            seek_map(SparkEngine(3), SPARK, AXES, visits=12, record=file, seed=3, **GUIDED)
 
 
 def test_a_saved_search_goes_on(tmp_path: Path) -> None:
     engine = SparkEngine(5)
     first = seek_map(engine, SPARK, AXES, visits=4, seed=5, **GUIDED)
     first.seeker.save(tmp_path / "search.json")
-    more = seek_map(engine, SPARK, AXES, visits=7, seeker=MapSeeking.load(tmp_path / "search.json"))
+    alone = MapSeeking.load(tmp_path / "search.json")
+    both = seek_map(SparkEngine(9), SPARK, AXES, visits=6, seeker=dataclasses.replace(first, seeker=MapSeeking.load(
+        tmp_path / "search.json")))  # fmt: skip
+    assert both.visits[:4] == first.visits
+    assert both.map.cells["support"].sum() == len(both.visits) == 6
+    more = seek_map(engine, SPARK, AXES, visits=7, seeker=alone)
     assert more.seeker.readings == 7
     assert more.cells.identical(seek_map(SparkEngine(5), SPARK, AXES, visits=7, seed=5, **GUIDED).cells)
 

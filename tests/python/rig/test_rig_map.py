@@ -94,7 +94,7 @@ def test_a_bus_that_carries_the_axes_carries_the_search(tmp_path: Path) -> None:
         ("[1200, 1800, 2400]", "3", "map.axes.speed_rpm = 3: must be a list of numbers"),
         ("[1200, 1800, 2400]", "[1200]", r"map.axes of speed_rpm = \[1200.0\]: must be two entries at least"),
         ("[1200, 1800, 2400]", "[0, 1800]", "map.axes at speed_rpm = 0, fuel_mg = 12: speed_rpm = 0"),
-        ("speed_rpm", "speed", "map.axes: 'speed' is no number of an operating point; did you mean 'speed_rpm'"),
+        ("speed_rpm", "speed", "map.axes: 'speed' is not a number of an operating point; did you mean 'speed_rpm'"),
         (AXES, "", "map.axes = {}: must be names with their entries"),
         ("visits = 4", "visits = 0", r"map.visits = 0: must be in \[1, "),
         ("visits = 4", "cycles = 4", "map: unknown.*cycles|map.cycles"),

@@ -19,9 +19,10 @@ from mgdd.loop.closed_loop import stillness
 from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.lower_limits import both_sides, measured_names
 from mgdd.loop.map_result import MapSearch
+from mgdd.loop.map_visits import dwell_of
 from mgdd.loop.seek import require_cycles, searched, seek_inputs, started, tell_known
 from mgdd.loop.seek_choice import Choice, Question, chosen
-from mgdd.loop.seek_map import Progress, dwell_of, map_seeker, model_of, require_end
+from mgdd.loop.seek_map import Progress, map_seeker, model_of, require_end
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize.map_seeking import entries_of
 from mgdd.plot.style import drawn

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -186,11 +185,5 @@ class ProcessModel {
   InputTable asked_, asked_columns_;
   Scales now_;
 };
-
-/// How much the largest of several quantities with these means is expected to rise once a reading of a quantity shows:
-/// E max(mean + effect Z) - max mean, Z standard normal (Frazier, Powell and Dayanik 2009). `order` and `breaks` are
-/// scratch of the same size.
-double knowledge_gradient(std::span<const double> mean, std::span<const double> effect, std::span<int> order,
-                          std::span<double> breaks) noexcept;
 
 }  // namespace mgdd::optimize

@@ -7,9 +7,13 @@
 #include <span>
 #include <vector>
 
-#include "mgdd/optimize/belief/process_model.hpp"
-
 namespace mgdd::optimize {
+
+/// How much the largest of several quantities with these means is expected to rise once a reading of a quantity shows:
+/// E max(mean + effect Z) - max mean, Z standard normal (Frazier, Powell and Dayanik 2009). `order` and `breaks` are
+/// scratch of the same size.
+double knowledge_gradient(std::span<const double> mean, std::span<const double> effect, std::span<int> order,
+                          std::span<double> breaks) noexcept;
 
 /// Room for as many inputs as are compared at once.
 struct WorthScratch {
