@@ -121,11 +121,20 @@ int ProcessModel::crowded_reading(const Inputs& about) noexcept {
   return *std::max_element(begin, near, [&](int a, int b) { return ages_[a] < ages_[b]; });
 }
 
-// One that the process follows, of about the same input and time; -1 where there is none.
-int ProcessModel::alike_reading(const Inputs& z) const noexcept {
-  for (std::int64_t i = 0; i < count_ && settings_.alike >= 0.0; ++i) {
+// One that the process follows, of about the same time, and of an input so near that what lies between them is lost in
+// the noise of their mean; -1 where there is none.
+int ProcessModel::alike_reading(const Inputs& z, double readings) noexcept {
+  if (settings_.alike < 0.0 || !begun_) return -1;
+  refresh();
+  double* const point = &asked_(0, 0);
+  kernel_.describe(z, point);
+  for (std::int64_t i = 0; i < count_; ++i) {
+    const double* const own = &points_(i, 0);
     const double off = (points_.row(i).head(z.size()).transpose() - z).cwiseAbs().maxCoeff();
-    if (off <= settings_.alike && trusted(i) && ages_[i] <= young * settings_.memory) return static_cast<int>(i);
+    if (off > settings_.alike || !trusted(i) || ages_[i] > young * settings_.memory) continue;
+    const double between = kernel_.covariance(point, point, now_) + kernel_.covariance(own, own, now_) -
+                           2.0 * kernel_.covariance(point, own, now_);
+    if (between * (averaged_[i] + readings) <= now_.noise_variance) return static_cast<int>(i);
   }
   return -1;
 }
@@ -133,7 +142,7 @@ int ProcessModel::alike_reading(const Inputs& z) const noexcept {
 double ProcessModel::record(const Inputs& z, double value, const Inputs& about, double readings) noexcept {
   const double odd = oddness(z, value, readings);
   ages_.head(count_).array() += 1.0;
-  const int known = scatter_of(odd) <= most_trusted ? alike_reading(z) : -1;
+  const int known = scatter_of(odd) <= most_trusted ? alike_reading(z, readings) : -1;
   if (known >= 0) {
     averaged_[known] += readings;
     const double share = readings / averaged_[known];

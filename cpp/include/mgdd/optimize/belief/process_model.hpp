@@ -33,7 +33,7 @@ class ProcessModel {
     bool labels = false;                   ///< readings are below or above 0: of the rarer ones those far away are kept
     double missed = -1.0, missed_sd = 0.7;  ///< logarithm of the share of all bends that the guide is expected to miss
     double rest = -4.5;                     ///< logarithm of the size of the rest over the bend, expected
-    double alike = -1.0;  ///< ranges of every input, within which young readings are averaged; below 0: never
+    double alike = -1.0;  ///< ranges of every input, within which young readings may be averaged; below 0: never
     std::uint64_t seed = 0;
     ProcessGuide guide{};
   };
@@ -155,7 +155,7 @@ class ProcessModel {
   void factor() noexcept;
   void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
-  int alike_reading(const Inputs& z) const noexcept;
+  int alike_reading(const Inputs& z, double readings) noexcept;
   double noise_of(std::int64_t reading, const Scales& s) const noexcept {
     return s.noise_variance * scatter_[reading] / averaged_[reading];
   }
