@@ -7,16 +7,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options
 from mgdd.cli.guide_map import add_model, cylinder_of
 from mgdd.cli.map_files import MAP_ENDINGS, shown_map
 from mgdd.cli.options import add_engine, add_over, option, point_given, refuse_idle
-from mgdd.cli.output import check_file, emit, lines, warn
+from mgdd.cli.output import check_file, emit, lines, save_figure, warn
 from mgdd.cli.progress import Stopped
 from mgdd.cli.ranges import grid_of, limits_given, number_pairs
 from mgdd.cli.seek import BENCH_NAMES, add_bench, bench_of, option_names
 from mgdd.errors import Interrupted, ParameterError
+from mgdd.io.point_table import read_points
+from mgdd.loop import VirtualEngine, seek
 from mgdd.loop.map_result import MapSearch
 from mgdd.loop.seek_map import Progress, seek_map
 from mgdd.maps import write_map
@@ -29,6 +33,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from mgdd.loop.seek_result import SeekResult
     from mgdd.maps import CalibrationMap
 
 _SEARCH, _SETTLING = Options(seek_map, "visits", "tolerance"), Options(seek_map, "settling")
@@ -54,7 +59,11 @@ def _add_seek(parser: Any) -> None:
     _SETTLING.add(parser, settling="20")
     option(parser, "--record FILE.csv",
            "write a row per visit; where the file holds some of this search, it goes on behind them")  # fmt: skip
+    option(parser, "--drive FILE.csv",
+           "then drive the engine through the points of the file, a row each: the axes, and cycles; the map goes on "
+           "learning in every one of them")  # fmt: skip
     option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
+    parser.add_argument("--live", action="store_true", help="draw --figure anew after every visit, to be watched")
     add_bench(parser, "none", "soft")
     group = parser.add_argument_group("guide: a rough model of the same bench, which the visits correct")
     option(group, "--guide", "model: J and limits of a model", default="none", choices=("none", "model"))
@@ -69,6 +78,8 @@ def _seek(args: argparse.Namespace) -> None:
         refuse_idle(args, "guide_preset", "guide_set", why="--guide none has no model: give --guide model")
     else:
         refuse_idle(args, "start", why="with --guide model the search starts at the best of the model")
+    if args.live and args.figure is None:
+        raise ParameterError("--live draws --figure anew after every visit: give --figure too")
     if not 1 <= len(axes) <= 2:
         raise ParameterError(f"--over is given {len(axes)} times: a map has one axis or two, as speed_rpm=1000:3000:5")
     if both := sorted(axes.keys() & point_given(args).keys()):
@@ -78,13 +89,16 @@ def _seek(args: argparse.Namespace) -> None:
         if len(bounds) > 1 and Path(args.output or "").suffix in (".nc", ".csv"):
             raise ParameterError(f"-o {args.output}: {len(bounds)} maps fit into a .dcm or .cdfx only")
         guide = cylinder_of(args, bench.settings["cylinder"]) if args.guide == "model" else None
-        interrupted = False
+        schedule = None if args.drive is None else _schedule(args.drive, list(axes), bench)
+        interrupted, driven = False, None
         try:
             found = seek_map(
                 bench, bounds, axes, limits=limits, guide=guide, start=start or None, averaged=_averaged(args.averaged),
                 record=args.record, on_visit=partial(_say, args), seed=bench.seed,
                 **_SEARCH.given(args), **_SETTLING.given(args),
             )  # fmt: skip
+            if schedule is not None:
+                found, driven = _drive(bench, bounds, found, limits, *schedule)
         except Interrupted as stop:
             if not isinstance(stop.partial, MapSearch):
                 raise
@@ -95,6 +109,8 @@ def _seek(args: argparse.Namespace) -> None:
     maps = list(found.maps.values())
     payload = found.to_dict() | {"interrupted": interrupted, "preset": preset, "sensor": args.sensor}
     payload |= {"seed": bench.seed, "guide": args.guide}
+    if driven is not None:
+        payload |= {"driven_cycles": driven.run.dataset.sizes["cycle"], "driven_j": driven.run.summary["mean_j"]}
     text = [*shown_map(args, *maps), "", lines(to_jsonable(payload))]
     write = dict.fromkeys(MAP_ENDINGS, partial(write_map, maps if len(maps) > 1 else maps[0]))
     emit(args, payload, text=text, write=write, figure=partial(_drawn, maps))
@@ -102,11 +118,39 @@ def _seek(args: argparse.Namespace) -> None:
         raise Stopped(f"{len(found.visits)} visits are kept")
 
 
+def _schedule(file: str, axes: list[str], bench: VirtualEngine) -> tuple[list[tuple[int, Any]], int]:
+    """Read which point is driven from which cycle on, and how many cycles there are."""
+    table = read_points(file, [*axes, "cycles"])
+    counts = table["cycles"].to_numpy()
+    if not ((counts >= 1.0) & (counts == np.round(counts))).all():
+        raise ParameterError(f"--drive {file}: column cycles: must be whole numbers >= 1")
+    begins = np.concatenate([[0.0], np.cumsum(counts)]).astype(int)
+    points = []
+    for k in range(counts.size):
+        try:
+            points.append(bench.point_at(0).replace(**{name: float(table[name][k]) for name in axes}))
+        except ParameterError as error:
+            raise ParameterError(f"--drive {file}, point {k + 1}: {error}") from error
+    return list(zip(begins[:-1].tolist(), points, strict=True)), int(begins[-1])
+
+
+def _drive(
+    bench: VirtualEngine, bounds: Any, found: MapSearch, limits: Any, schedule: Any, cycles: int
+) -> tuple[MapSearch, SeekResult]:
+    """Drive the engine of the bench by the map, which learns in every cycle."""
+    own = bench.settings | {"schedule": schedule}
+    driver = found.seeker.driver()
+    run = seek(VirtualEngine(own.pop("cylinder"), **own), bounds, seeker=driver, limits=limits, cycles=cycles)
+    return found.driven(driver), run
+
+
 def _say(args: argparse.Namespace, so_far: Progress) -> None:
     settled = "" if args.tolerance is None else f", {so_far.settled} cells settled"
     args.progress.expect(_SEARCH.of(args)["visits"])(
         f"visit {so_far.visit}: expected regret {so_far.regret:.3g}{settled}"
     )
+    if args.live:
+        save_figure(_drawn(list(so_far.search.maps.values())), args.figure, quiet=True)
 
 
 def _averaged(given: str | None) -> int | tuple[int, int] | None:

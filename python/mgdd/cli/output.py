@@ -54,10 +54,11 @@ def check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
         raise ParameterError(f"{option} {file}: the folder {folder} does not exist; make it, or name another file")
 
 
-def save_figure(figure: Figure, file: str) -> None:
+def save_figure(figure: Figure, file: str, *, quiet: bool = False) -> None:
     """Write a figure, whole or not at all, and say so."""
     write_whole(file, lambda half: figure.savefig(half, dpi=150, format=Path(file).suffix[1:]))
-    wrote(file)
+    if not quiet:
+        wrote(file)
 
 
 def wrote(file: str) -> None:

@@ -49,12 +49,15 @@ class Progress(NamedTuple):
         By how much J of the true best is expected to be above that of the map, mean of the cells [unit of J].
     settled : int
         Cells where it is within the tolerance; 0 without one.
+    search : MapSearch
+        The map so far: ``search.plot()`` draws it.
     """
 
     visit: int
     last: Visit
     regret: float
     settled: int
+    search: MapSearch
 
 
 def seek_map(
@@ -277,11 +280,12 @@ def _searched(
             if file is not None:
                 file.write(visit)
             if tolerance is not None or on_visit is not None:
-                cells = seeker.cells()["regret"].to_numpy()
+                so_far = MapSearch.of(seeker, made, tolerance=tolerance, interrupted=False)
+                cells = so_far.cells["regret"].to_numpy()
                 regret = float(cells.max()) if np.isfinite(cells).all() else math.inf
                 if on_visit is not None:
                     settled = 0 if tolerance is None else int((cells <= tolerance).sum())
-                    on_visit(Progress(seeker.readings, visit, float(cells.mean()), settled))
+                    on_visit(Progress(seeker.readings, visit, so_far.regret, settled, so_far))
                 if tolerance is not None and seeker.readings >= fewest and regret <= tolerance:
                     break
     except KeyboardInterrupt:

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mgdd.cli import main
@@ -57,6 +58,41 @@ def test_two_inputs_are_two_labels_of_one_file(tmp_path: Path, capsys: Capsys) -
     assert drawn.stat().st_size > 10_000
 
 
+def test_an_engine_is_driven_and_the_map_learns_on(
+    tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("drive.csv").write_text("speed_rpm,fuel_mg,cycles\n1300,13,20\n2350,27,15\n")
+    drawn = list[bytes]()
+    monkeypatch.setattr("mgdd.cli.map_seek.save_figure", lambda *_, quiet: drawn.append(b"" if quiet else b"told"))
+    argv = [*AXES, *MODEL, "--visits", "5", "--drive", "drive.csv", "--figure", "map.png", "--live", "-o", "map.nc"]
+    found = seek(capsys, *argv)
+    assert drawn == [b""] * 5
+    assert Path("map.png").stat().st_size > 10_000
+    assert found["driven_cycles"] == 35
+    assert 40.0 < found["driven_j"] < 60.0  # percent
+    learnt = read_map(Path("map.nc"))
+    assert learnt.provenance["driven"] == "35 cycles"
+    assert np.argwhere(learnt.cells["source"] == "learned").tolist() == [[0, 0], [2, 1]]
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("speed_rpm,cycles\n1300,20\n", "no column 'fuel_mg'"),
+        ("speed_rpm,fuel_mg,cycles\n1300,13,2.5\n", "column cycles: must be whole numbers >= 1"),
+        ("speed_rpm,fuel_mg,cycles\n1300,13,9\n-1300,13,9\n", "point 2: speed_rpm = -1300 rpm: must be"),
+    ],
+)
+def test_a_drive_that_cannot_be_driven_is_refused_before_the_first_visit(
+    tmp_path: Path, capsys: Capsys, rows: str, said: str
+) -> None:
+    file, record = tmp_path / "drive.csv", tmp_path / "visits.csv"
+    file.write_text(rows)
+    assert said in refused(capsys, *AXES, *MODEL, "--drive", str(file), "--record", str(record))
+    assert not record.exists()
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -74,6 +110,7 @@ def test_two_inputs_are_two_labels_of_one_file(tmp_path: Path, capsys: Capsys) -
         ("--over fuel_mg=9,20 --visits 0", "--visits 0: must be a whole number >= 1"),
         ("--over fuel_mg=9,20 --limit cov_imep_percent=3 --guide model", "--limit: cov_imep_percent has no steady"),
         ("--over fuel_mg=9,20 --input egr=0:0.3 -o a.nc", "-o a.nc: 2 maps fit into a .dcm or .cdfx only"),
+        ("--over fuel_mg=9,20 --live", "--live draws --figure anew after every visit: give --figure too"),
         ("--over fuel_mg=9,20 --record none/a.csv", "--record none/a.csv: the folder none does not exist"),
     ],
 )  # fmt: skip

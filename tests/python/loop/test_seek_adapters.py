@@ -88,7 +88,8 @@ def test_an_optimizable_is_sought() -> None:
     assert list(of_page("seek_optimizable")(Optimizable(), cycles=10).inputs) == ["parameter_0", "parameter_1"]
 
 
-def test_the_lines_of_the_page_about_one_call_run() -> None:
+def test_the_lines_of_the_page_about_one_call_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     text = PAGE.read_text(encoding="utf-8")
     section = text.split("## Find the best settings")[1].split("\n## ")[0]
     space: dict[str, Any] = {}
