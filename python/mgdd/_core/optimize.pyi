@@ -1404,7 +1404,7 @@ class MapSeeking:
     """
     A map by Gaussian processes; see mgdd.optimize.MapSeeking.
     """
-    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, context: collections.abc.Sequence[Input] | None = None, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, averaged: typing.SupportsFloat | typing.SupportsIndex = 1.0, moving_cost: typing.SupportsFloat | typing.SupportsIndex = 0.0, memory_readings: typing.SupportsFloat | typing.SupportsIndex = 1000.0, kept: typing.SupportsInt | typing.SupportsIndex = 200, reach: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, bounds: typing.Any = None, inputs: collections.abc.Sequence[Input] | None = None, context: collections.abc.Sequence[Input] | None = None, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, averaged: typing.SupportsFloat | typing.SupportsIndex = 1.0, moving_cost: typing.SupportsFloat | typing.SupportsIndex = 0.0, memory_readings: typing.SupportsFloat | typing.SupportsIndex = 1000.0, kept: typing.SupportsInt | typing.SupportsIndex = 200, smoothness: typing.SupportsFloat | typing.SupportsIndex = 0.0, reach: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
         """
         start : first estimate, per input
         bounds : least and largest applied input, each a number or one per input; none without
@@ -1417,6 +1417,7 @@ class MapSeeking:
         moving_cost : of another operating point, in visits
         memory_readings : in which level and place are expected to wander
         kept : readings at most
+        smoothness : J that a squared bend of the map costs
         reach : from the best input of a cell, share of the bounds
         limit_probability : with which a limit holds in a cell
         seed : of the inputs that are compared

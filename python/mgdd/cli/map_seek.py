@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from mgdd.loop.seek_result import SeekResult
     from mgdd.maps import CalibrationMap
 
-_SEARCH, _SETTLING = Options(seek_map, "visits", "tolerance"), Options(seek_map, "settling")
-_NAMES = {**BENCH_NAMES, **{name: name for name in ("visits", "settling", "averaged", "record")},
+_SEARCH, _SETTLING = Options(seek_map, "visits", "tolerance", "smoothness"), Options(seek_map, "settling")
+_NAMES = {**BENCH_NAMES, **{name: name for name in ("visits", "smoothness", "settling", "averaged", "record")},
           "axes": "over", "guide": "guide_set"}  # fmt: skip
 
 

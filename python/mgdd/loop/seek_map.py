@@ -73,6 +73,7 @@ def seek_map(
     tolerance: float | None = None,
     averaged: int | tuple[int, int] | None = None,
     settling: int | None = None,
+    smoothness: float = 0.0,
     maximize: bool = True,
     seeker: MapSearch | MapSeeking | None = None,
     record: str | os.PathLike[str] | None = None,
@@ -113,6 +114,9 @@ def seek_map(
         mean is surer than half of what was not known there. 50 on a plant, 1 of a function.
     settling : int, optional
         Cycles of a visit before them that do not count: 20 on a plant, 0 of a function.
+    smoothness : float
+        J that one squared bend of the map may cost, 0 for none: a second difference along an axis, in ranges of the
+        input per squared mean step of the axis. The search visits what the smooth map needs.
     maximize : bool
         False to minimise J.
     seeker : MapSearch or MapSeeking, optional
@@ -177,7 +181,7 @@ def seek_map(
             guide, limit_guides = model_of(driven, cylinder, entries, sought, [limit.name for limit in sides])
         seeker = map_seeker(
             inputs, entries, dwell, settings or {}, limits=sides, guide=guide, limit_guides=limit_guides,
-            start=started(start, sought), maximize=maximize, seed=seed,
+            start=started(start, sought), smoothness=smoothness, maximize=maximize, seed=seed,
         )  # fmt: skip
     return _searched(with_lower_sides(driven, sides), seeker, dwell, before, visits, tolerance, record, on_visit)
 

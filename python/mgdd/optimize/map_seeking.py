@@ -88,6 +88,9 @@ class MapSeeking(_core.optimize.MapSeeking):
         Readings for which what `ask` learns at a point pays.
     kept : int
         Readings at most, 10 to 500. Alike ones that follow each other are averaged.
+    smoothness : float
+        J that one squared bend of the map may cost, 0 for none: a second difference along an axis, in ranges of the
+        input per squared mean step of the axis. The search visits what the smooth map needs.
     reach : float
         Under limits nothing is asked farther from the best inputs of a cell than this share of the bounds, nor twice as
         far beyond what was read.

@@ -110,10 +110,58 @@ TEST(MapSeeking, TenVisitsAndARoughModelMakeTheMapOfAnotherEngine) {
 
 TEST(MapSeeking, WithoutAModelItTakesMoreVisits) {
   const Plant plant;
-  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+  int near = 0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
     MapSeeking search(settings(seed, nullptr));
-    EXPECT_LT(visited(search, plant, 40, seed).worst_loss, 10.0) << seed;
+    near += visited(search, plant, 40, seed).worst_loss < 10.0 ? 1 : 0;
   }
+  EXPECT_GE(near, 7);  // as 28 of 40 are
+}
+
+// Sum over both axes of squared second differences, in ranges of the spark per squared mean step.
+double bends(MapSeeking& search) {
+  const auto& axes = search.settings().axes;
+  const auto at = [&](std::size_t i, std::size_t j) { return search.best(i * axes[1].size() + j).input[0] / 55.0; };
+  const auto bend = [](const std::vector<double>& axis, std::size_t k, double low, double middle, double high) {
+    const double step = (axis.back() - axis.front()) / static_cast<double>(axis.size() - 1);
+    const double before = (axis[k] - axis[k - 1]) / step, after = (axis[k + 1] - axis[k]) / step;
+    const double second = 2.0 / (before + after) * ((high - middle) / after - (middle - low) / before);
+    return second * second;
+  };
+  double out = 0.0;
+  for (std::size_t i = 0; i < axes[0].size(); ++i) {
+    for (std::size_t j = 0; j < axes[1].size(); ++j) {
+      if (i > 0 && i + 1 < axes[0].size()) out += bend(axes[0], i, at(i - 1, j), at(i, j), at(i + 1, j));
+      if (j > 0 && j + 1 < axes[1].size()) out += bend(axes[1], j, at(i, j - 1), at(i, j), at(i, j + 1));
+    }
+  }
+  return out;
+}
+
+// By the same readings: what a smooth map loses, its bends no longer cost.
+TEST(MapSeeking, ASmoothMapIsWorthMoreThanThePlainOneWhereBendsCost) {
+  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
+  MapSeekingSettings own = settings(3, &rough);
+  own.axes = {{1.0, 1.5, 2.6, 4.0}, {0.3, 0.55, 0.9}};
+  MapSeeking plain(own);
+  own.smoothness = 3000.0;
+  MapSeeking smooth(own);
+  for (std::uint64_t k = 0; k < 12; ++k) {
+    const MapSeeking::Visit visit = smooth.suggest();
+    for (MapSeeking* one : {&plain, &smooth})
+      read(*one, plant, visit.context, visit.input, k);
+  }
+  const auto expected = [](MapSeeking& search) {
+    double out = 0.0;
+    for (std::size_t c = 0; c < search.cells(); ++c)
+      out += search.best(c).expected;
+    return out;
+  };
+  EXPECT_LT(bends(smooth), 0.6 * bends(plain));
+  EXPECT_GT(expected(smooth) - own.smoothness * bends(smooth), expected(plain) - own.smoothness * bends(plain));
+  EXPECT_LE(expected(smooth), expected(plain) + 0.01);
+  for (std::size_t c = 0; c < smooth.cells(); ++c)
+    EXPECT_LE(plant.knock(smooth.cell(c), smooth.best(c).input[0]), 1.02 * knock_limit) << c;
 }
 
 TEST(MapSeeking, AModelOfTheWrongWayIsLeftBehind) {

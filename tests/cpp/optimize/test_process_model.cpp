@@ -159,5 +159,19 @@ TEST(KnowledgeGradient, IsTheMeanRiseOfTheLargest) {
   EXPECT_EQ(knowledge_gradient(std::vector<double>{1.0, 2.0, 0.0}, same, {order.data(), 3}, {breaks.data(), 3}), 0.0);
 }
 
+// Two sure means at inputs that lie close together tell a slope that their mean does not.
+TEST(ProcessModel, MeansAreKeptApartWhereWhatLiesBetweenThemIsMoreThanTheirNoise) {
+  const Inputs about = at(0.4, 0.6), here = at(0.40, 0.58), beside = at(0.408, 0.58);
+  for (const double readings : {1.0, 400.0}) {
+    ProcessModel model = told(40, 0.3, {.alike = 0.01});
+    model.record(here, surface(here), about, readings);
+    const int count = model.count();
+    model.record(beside, surface(beside), about, readings);
+    EXPECT_EQ(model.count(), readings > 1.0 ? count + 1 : count) << readings;
+    model.record(beside, surface(beside), about, readings);
+    EXPECT_EQ(model.count(), readings > 1.0 ? count + 1 : count) << "the same input";
+  }
+}
+
 }  // namespace
 }  // namespace mgdd::optimize

@@ -8,6 +8,9 @@ namespace {
 
 // Priors, in bends: J = level - bend/2 |z - 1/2|^2 + slopes (sd 0.4) + bends (0.6) + couplings (0.5) + the rest.
 constexpr double level_sd = 3.0, slope_sd = 0.4, bend_sd = 0.6, coupling_sd = 0.5;
+// What a model misses depends less on the operating point than on the input: of both, as shares. Readings at one point
+// alone would else leave all others in doubt.
+constexpr double context_share = 0.4;
 constexpr double parabola_sd = 0.0745;  // of |z - 1/2|^2 over evenly spread z, one input: 1/sqrt(180)
 
 }  // namespace
@@ -15,6 +18,7 @@ constexpr double parabola_sd = 0.0745;  // of |z - 1/2|^2 over evenly spread z, 
 ProcessKernel::ProcessKernel(Eigen::Index inputs, Eigen::Index context, bool bends_down, ProcessGuide guide)
     : inputs_(inputs), context_(context), bends_down_(bends_down), guide_(std::move(guide)) {
   if (!guided()) return;
+  of_context_ = context_share;
   const Eigen::Map<const Eigen::ArrayXd> values(guide_.surface.values().data(),
                                                 static_cast<Eigen::Index>(guide_.surface.values().size()));
   guide_middle_ = values.mean();
@@ -44,7 +48,7 @@ double ProcessKernel::mean(const double* point, const Scales& s) const noexcept 
 ProcessKernel::Fixed ProcessKernel::fixed(const double* a, const double* b) const noexcept {
   double slopes = 0.0, bends = 0.0, couplings = 0.0, guide = 0.0;
   for (Eigen::Index i = 0; i < inputs_; ++i) {
-    const double both = (a[i] - 0.5) * (b[i] - 0.5);
+    const double both = (a[i] - 0.5) * (b[i] - 0.5) * (i < context_ ? of_context_ : 1.0);
     couplings += slopes * both;  // of every pair once
     slopes += both;
     bends += 0.25 * both * both;
@@ -79,7 +83,7 @@ void ProcessKernel::covariances(const double* point, const Columns& others, Eige
   Row slopes = Row::Zero(count), rest = slopes, squares = slopes, both(count);
   for (Eigen::Index i = 0; i < inputs_; ++i) {
     const auto own = others.row(i).head(count).array();
-    both = (point[i] - 0.5) * (own - 0.5);
+    both = (i < context_ ? of_context_ : 1.0) * (point[i] - 0.5) * (own - 0.5);
     rest += both * (coupling_sd * coupling_sd * slopes + 0.25 * bend_sd * bend_sd * both);
     slopes += both;
     squares += ((own - point[i]) * s.inverse_length[i]).square();

@@ -43,39 +43,45 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
     on[i] = cubic_weights(axes_[i], interval_of(axes_[i], held), held);
     if (held != at[own]) on[i].slope.fill(0.0);
   }
-  // The nodes around, then without their last axis, and so on: what is left of the value and of every slope.
-  constexpr Eigen::Index around = 1024;
+  // Rows of nodes around along the last axis, which lie side by side, then without their last axis, and so on: what is
+  // left of the value and of every slope.
+  constexpr Eigen::Index rows = 256;
   static_assert(most_inputs == 5);  // of four nodes each
-  Eigen::Array<double, around, 1> value;
-  Eigen::Array<double, around / 4, most_inputs> slope;  // a column per axis
+  Eigen::Array<double, rows, 1> value;
+  Eigen::Array<double, rows, most_inputs> slope;  // a column per axis
+  const auto contract = [](const double* from, const std::array<double, 4>& weights, std::size_t count) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < count; ++k)
+      sum += weights[k] * from[k];
+    return sum;
+  };
+  const auto axes = static_cast<Eigen::Index>(n);
+  std::size_t node = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    node += on[i].first * stride[i];
   Eigen::Index left = 0;
   for (bool more = true; more; ++left) {
-    std::size_t node = 0;
-    for (std::size_t i = 0; i < n; ++i)
-      node += (on[i].first + step[i]) * stride[i];
-    value[left] = values_[node];
-    std::size_t axis = n;
-    while (axis > 0 && ++step[axis - 1] == on[axis - 1].count)
-      step[--axis] = 0;
-    more = axis > 0;
+    value[left] = contract(&values_[node], on[n - 1].value, on[n - 1].count);
+    slope(left, axes - 1) = contract(&values_[node], on[n - 1].slope, on[n - 1].count);
+    more = false;
+    for (std::size_t axis = n - 1; axis-- > 0 && !more;) {
+      more = ++step[axis] < on[axis].count;
+      node += stride[axis];
+      if (more) continue;
+      step[axis] = 0;
+      node -= on[axis].count * stride[axis];
+    }
   }
-  const auto axes = static_cast<Eigen::Index>(n);
-  for (Eigen::Index i = axes; i-- > 0;) {
+  for (Eigen::Index i = axes - 1; i-- > 0;) {
     const CubicWeights& own = on[static_cast<std::size_t>(i)];
     const auto count = static_cast<Eigen::Index>(own.count);
     left /= count;
-    const auto contract = [&](const double* from, const std::array<double, 4>& weights) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < own.count; ++k)
-        sum += weights[k] * from[k];
-      return sum;
-    };
     for (Eigen::Index p = 0; p < left; ++p) {
       const Eigen::Index from = p * count;
-      slope(p, i) = contract(&value[from], own.slope);
+      slope(p, i) = contract(&value[from], own.slope, own.count);
       for (Eigen::Index k = i + 1; k < axes; ++k)
-        slope(p, k) = contract(&slope(from, k), own.value);
-      value[p] = contract(&value[from], own.value);
+        slope(p, k) = contract(&slope(from, k), own.value, own.count);
+      value[p] = contract(&value[from], own.value, own.count);
     }
   }
   slopes = slope.row(0).head(axes).matrix().transpose();

@@ -87,7 +87,7 @@ int MapSeeking::visits_of(std::size_t c, std::span<int> out) const noexcept {
   double most = 0.0, wide = 0.0;
   for (int p = from; p < from + per_place; ++p) {
     if (!safe(p, places_[c])) continue;
-    const double sd = j_.sd(p), hope = j_.mean(p) + promising * sd;
+    const double sd = j_.sd(p), hope = worth(p) + promising * sd;
     if (promise < 0 || hope > most) {
       most = hope;
       promise = p;
@@ -121,7 +121,7 @@ double MapSeeking::gain_of(int point) noexcept {
     const std::span<double> means(worth_.mean.data(), n), effects(worth_.effect.data(), n);
     for (std::size_t k = 0; k < n; ++k) {
       const int p = safe_[from + k];
-      means[k] = j_.mean(p);
+      means[k] = worth(p);
       effects[k] = effect_[static_cast<std::size_t>(p)] / sd;
     }
     const auto [least, most] = std::ranges::minmax(effects);
@@ -211,7 +211,7 @@ const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
     const double noise = std::max(j_.noise_sd(), worth_noise * std::abs(j_.mean(0)));
     const double read = static_cast<double>(j_.count()) / (cautious_readings * static_cast<double>(1 + inputs_));
     next = most_worth(
-        {safe_.data(), static_cast<std::size_t>(count)}, [this](int p) { return j_.mean(p); },
+        {safe_.data(), static_cast<std::size_t>(count)}, [this](int p) { return worth(p); },
         [this](int p, int q) { return joint_(p, q); }, noise, settings_.horizon * std::min(1.0, read), worth_);
   }
   asked_ = unscaled(candidates_.row(next).tail(inputs_).transpose());
@@ -254,7 +254,7 @@ void MapSeeking::sample(std::size_t c, Best& out) noexcept {
     double most = 0.0, own = 0.0;
     Eigen::Index best = 0;
     for (Eigen::Index k = 0; k < n; ++k) {
-      const double value = j_.mean(at(k)) + dot(&joint_(k, 0), worth_.effect.data(), k + 1);
+      const double value = worth(at(k)) + dot(&joint_(k, 0), worth_.effect.data(), k + 1);
       if (k == 0) own = most = value;
       if (value <= most) continue;
       most = value;

@@ -59,13 +59,32 @@ void MapSeeking::judge(int points) noexcept {
   });
 }
 
-// Of a place's points the one with the largest mean that keeps the limits, or the least unsafe one.
-void MapSeeking::keep_best(Place& place, int from, int count) noexcept {
+// What the bends of the map at a place cost with that input there, the others as they are known.
+double MapSeeking::roughness(const Place& place, const Inputs& z) const noexcept {
+  double out = 0.0;
+  for (const Bend& bend : bends_[static_cast<std::size_t>(&place - places_.data())]) {
+    const auto other = [&](std::size_t k) { return bend.weights[k] * places_[bend.others[k]].best; };
+    out += settings_.smoothness * (bend.own * z + other(0) + other(1)).squaredNorm();
+  }
+  return out;
+}
+
+void MapSeeking::know_roughness(const Place& place, int from, int count, bool counts) noexcept {
+  if (settings_.smoothness == 0.0) return;
+  for (int p = from; p < from + count; ++p) {
+    const Inputs z = candidates_.row(p).tail(inputs_).transpose();
+    rough_[static_cast<std::size_t>(p)] = counts ? roughness(place, z) : 0.0;
+  }
+}
+
+// Of a place's points the one that is worth most and keeps the limits, or the least unsafe one.
+void MapSeeking::keep_best(Place& place, int from, int count, bool smooth) noexcept {
+  know_roughness(place, from, count, smooth);
   int best = from;
   for (int p = from + 1; p < from + count; ++p) {
     const auto own = static_cast<std::size_t>(p), known = static_cast<std::size_t>(best);
     const bool safe = over_[own] <= 0.0, was = over_[known] <= 0.0;
-    const bool better = safe != was ? safe : safe ? j_.mean(p) > j_.mean(best) : over_[own] < over_[known];
+    const bool better = safe != was ? safe : safe ? worth(p) > worth(best) : over_[own] < over_[known];
     if (better) best = p;
   }
   place.best = candidates_.row(best).tail(inputs_).transpose();
@@ -96,15 +115,8 @@ void MapSeeking::scatter(std::span<const Place> places) noexcept {
   j_.predict(candidates_, row);
 }
 
-void MapSeeking::search(std::span<Place> places) noexcept {
-  for (Place& place : places)
-    place.best = place.from;
-  scatter(places);
-  int from = 0;
-  for (Place& place : places) {
-    keep_best(place, from, per_place);
-    from += per_place;
-  }
+// Around the best of every place, ever nearer.
+void MapSeeking::narrow(std::span<Place> places, bool smooth) noexcept {
   double width = map_width;
   for (int round = 0; round < map_rounds; ++round, width *= map_shrinks) {
     int row = 0;
@@ -120,14 +132,33 @@ void MapSeeking::search(std::span<Place> places) noexcept {
     }
     judge(row);
     j_.predict_means(candidates_, row);
-    from = 0;
+    int from = 0;
     for (Place& place : places) {
-      keep_best(place, from, cloud);
+      keep_best(place, from, cloud, smooth);
       from += cloud;
     }
   }
+}
+
+// Of every place for itself, then, where it counts, as one smooth map: place by place that is worth ever more.
+void MapSeeking::search(std::span<Place> places) noexcept {
+  for (Place& place : places)
+    place.best = place.from;
+  scatter(places);
+  int from = 0;
+  for (Place& place : places) {
+    keep_best(place, from, per_place, false);
+    from += per_place;
+  }
+  narrow(places, false);
+  if (settings_.smoothness > 0.0) narrow(places, true);
   know_edges(places);
   scatter(places);
+  from = 0;
+  for (const Place& place : places) {
+    know_roughness(place, from, per_place, true);
+    from += per_place;
+  }
   choose_safe(places);
 }
 

@@ -121,6 +121,7 @@ MapSeekingSettings resolved(MapSeekingSettings s) {
   require_in(Domain{0.0, 1e6}, "moving_cost", s.moving_cost);
   require_in(Domain{10.0, 1e9}, "memory_readings", s.memory_readings);
   require_in(Domain{10.0, most_kept}, "kept", s.kept);
+  require_in(closed(0.0, 1e12), "smoothness", s.smoothness);
   require_in(Domain{1e-3, 1.0}, "reach", s.reach);
   require_in(Domain{0.5, 0.9999}, "limit_probability", s.limit_probability);
   validate(s.limits);
@@ -156,11 +157,34 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
   for (std::size_t c = 0; c < places_.size(); ++c)
     places_[c] = {c < cells() ? scaled_context(cell(c)) : Inputs(Inputs::Zero(context_)), lowest_, lowest_};
   const auto points = static_cast<std::size_t>(candidates_.rows());
-  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &effect_})
+  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &rough_, &effect_})
     one->assign(points, 0.0);
   safe_.assign(points, 0);
   safe_from_.assign(places_.size() + 1, 0);
   multipliers_.assign(places_.size() * limited_.size(), 0.0);
+  bends_ = bends_of_cells();
+}
+
+std::vector<std::vector<MapSeeking::Bend>> MapSeeking::bends_of_cells() const {
+  std::vector<std::vector<Bend>> out(places_.size());
+  if (settings_.smoothness == 0.0) return out;
+  std::size_t stride = cells();
+  for (const auto& axis : settings_.axes) {
+    stride /= axis.size();
+    const double mean_step = (axis.back() - axis.front()) / static_cast<double>(axis.size() - 1);
+    for (std::size_t c = 0; c < cells(); ++c) {
+      const std::size_t k = c / stride % axis.size();
+      if (k == 0 || k + 1 == axis.size()) continue;
+      const double before = (axis[k] - axis[k - 1]) / mean_step, after = (axis[k + 1] - axis[k]) / mean_step;
+      const double both = 0.5 * (before + after), left = 1.0 / (before * both), right = 1.0 / (after * both);
+      const double middle = -2.0 / (before * after);
+      const std::size_t low = c - stride, high = c + stride;
+      out[low].push_back({left, {c, high}, {middle, right}});
+      out[c].push_back({middle, {low, high}, {left, right}});
+      out[high].push_back({right, {low, c}, {left, middle}});
+    }
+  }
+  return out;
 }
 
 Inputs MapSeeking::cell(std::size_t c) const noexcept {

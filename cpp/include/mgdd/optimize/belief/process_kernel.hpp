@@ -70,6 +70,7 @@ class ProcessKernel {
   bool bends_down_;
   ProcessGuide guide_;
   double guide_middle_ = 0.0, guide_bend_ = 0.0;
+  double of_context_ = 1.0;  // variance of slopes over the context, over that of the inputs
 };
 
 }  // namespace mgdd::optimize

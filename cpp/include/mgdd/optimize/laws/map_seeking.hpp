@@ -8,6 +8,7 @@
 // noexcept and allocation-free; all randomness is a function of (seed, readings).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -36,6 +37,7 @@ struct MapSeekingSettings {
   double moving_cost = 0.0;                 ///< of another operating point, in readings
   double memory_readings = 1000.0;          ///< in which level and place are expected to wander by what counts
   int kept = 200;                           ///< readings at most, 10 to 500
+  double smoothness = 0.0;                  ///< J that a squared bend of the map costs, see `Bend`
   double reach = 0.1;                       ///< from the best input of a cell, in bounds, where there are limits
   double limit_probability = 0.95;          ///< with which a limit holds in a cell, and in forty readings
   std::uint64_t seed = 0;
@@ -56,6 +58,7 @@ inline auto fields_of(const MapSeekingSettings&) {
       field<&S::moving_cost>("moving_cost", "of another operating point, in visits"),
       field<&S::memory_readings>("memory_readings", "in which level and place are expected to wander"),
       field<&S::kept>("kept", "readings at most"),
+      field<&S::smoothness>("smoothness", "J that a squared bend of the map costs"),
       field<&S::reach>("reach", "from the best input of a cell, share of the bounds"),
       field<&S::limit_probability>("limit_probability", "with which a limit holds in a cell"),
       field<&S::seed>("seed", "of the inputs that are compared"),
@@ -151,6 +154,17 @@ class MapSeeking {
     Inputs from;           // that its search begins at, so that it is a function of the readings alone
     double excess = 0.0;   // of the worst limit there, with its probability
   };
+  /// A second difference of the map along an axis that a cell is part of, in ranges of the inputs, the axis counted in
+  /// its mean steps: `own` times the input of the cell, plus those of two others.
+  struct Bend {
+    double own;
+    std::array<std::size_t, 2> others;
+    std::array<double, 2> weights;
+  };
+  std::vector<std::vector<Bend>> bends_of_cells() const;
+  double roughness(const Place& place, const Inputs& z) const noexcept;
+  double worth(int point) const noexcept { return j_.mean(point) - rough_[static_cast<std::size_t>(point)]; }
+  void know_roughness(const Place& place, int from, int count, bool counts) noexcept;
   std::span<Place> all_cells() noexcept { return {places_.data(), cells()}; }
   Inputs scaled_context(const Inputs& context) const noexcept;
   Inputs scaled(const Inputs& input) const noexcept;
@@ -163,7 +177,8 @@ class MapSeeking {
   bool safe(int point, const Place& place) const noexcept;
   bool known() const noexcept;
   void scatter(std::span<const Place> places) noexcept;
-  void keep_best(Place& place, int from, int count) noexcept;
+  void keep_best(Place& place, int from, int count, bool smooth) noexcept;
+  void narrow(std::span<Place> places, bool smooth) noexcept;
   void search(std::span<Place> places) noexcept;
   void know_cells() noexcept;
   void know_edges(std::span<const Place> places) noexcept;
@@ -188,12 +203,13 @@ class MapSeeking {
   std::vector<double> failures_;  // of the last readings of each cell, in a row
   Inputs lowest_, highest_;       // inputs that were read, scaled
   Inputs last_context_;
-  bool searched_ = false;  // what is known of the cells is that of all readings
+  std::vector<std::vector<Bend>> bends_;  // of every cell, where smoothness counts
+  bool searched_ = false;                 // what is known of the cells is that of all readings
   Visit visit_;
   Inputs asked_;
   // Scratch: of points, then of cells and limits.
   InputTable candidates_;
-  std::vector<double> over_, cautious_, mean_over_, effect_;
+  std::vector<double> over_, cautious_, mean_over_, rough_, effect_;
   std::vector<int> safe_, safe_from_;  // candidates that keep the limits, cell by cell
   std::vector<double> multipliers_;
   InputTable edges_, joint_;
