@@ -209,8 +209,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
 
 def _require_point(point: Any) -> None:
-    if not isinstance(point, OperatingPoint):
-        raise ParameterError.of("point", point, "an OperatingPoint")
+    ParameterError.unless(isinstance(point, OperatingPoint), "point", point, "an OperatingPoint")
 
 
 def _rebuild(cls: type[ModelOptimum], cylinder: Cylinder, settings: dict[str, Any]) -> ModelOptimum:

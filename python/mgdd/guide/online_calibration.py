@@ -138,8 +138,7 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
         step_cad: float = 1.0,
         integrator: str = "trapezoid",
     ) -> None:
-        if isinstance(parameters, str):
-            raise ParameterError.of("parameters", parameters, "a sequence of names")
+        ParameterError.unless(not isinstance(parameters, str), "parameters", parameters, "a sequence of names")
         super().__init__(
             cylinder=cylinder_of(cylinder),
             method=method,

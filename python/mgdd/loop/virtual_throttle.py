@@ -71,8 +71,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
     ) -> None:
         if not inputs or len(set(inputs)) < len(inputs) or not set(inputs) <= set(_INPUTS):
             raise ParameterError.of("inputs", list(inputs), f"some of {', '.join(_INPUTS)}, once each")
-        if not 0 <= seed < 2**64:
-            raise ParameterError.of("seed", seed, "in [0, 2**64)")
+        ParameterError.unless(0 <= seed < 2**64, "seed", seed, "in [0, 2**64)")
         self.throttle = Throttle() if throttle is None else throttle_of(throttle)
         self.sample_s = sample_s
         self.input_names = tuple(inputs)

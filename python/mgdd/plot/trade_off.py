@@ -67,8 +67,7 @@ def trade_off(
     >>> trade_off(sweep, "p_max_bar", "efficiency_gross").get_xlabel()
     'maximum pressure [bar]'
     """
-    if every < 1:
-        raise ParameterError.of("every", every, ">= 1")
+    ParameterError.unless(every >= 1, "every", every, ">= 1")
     sweep = require("sweep", sweep, (over, x, y), "mgdd.engine.timing_sweep")
     others = [str(dim) for dim in sweep[y].dims if dim != over]
     if over not in sweep[y].dims or len(others) > 1 or set(sweep[x].dims) != set(sweep[y].dims):

@@ -261,8 +261,7 @@ def _shipped(name: str) -> Preset | None:
 
 
 def _check_kind(kind: str | None) -> None:
-    if kind is not None and kind not in _OF_KIND:
-        raise ParameterError.of("kind", kind, f"one of {', '.join(_OF_KIND)}")
+    ParameterError.unless(kind is None or kind in _OF_KIND, "kind", kind, f"one of {', '.join(_OF_KIND)}")
 
 
 def _wrong_kind(name: str, kind: str, needed: str) -> str:

@@ -175,8 +175,7 @@ class FitReport(Result):
         """
         from scipy.stats import t
 
-        if not 0.0 < level < 1.0:
-            raise ParameterError.of("level", level, "between 0 and 1")
+        ParameterError.unless(0.0 < level < 1.0, "level", level, "between 0 and 1")
         if self.residual_blocks is None:
             freedom = float(self.residual.size - np.count_nonzero(self.bounds_active == 0))
         else:
