@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mgdd import _core
+from mgdd._settings import remade
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets.meant import ThrottleLike, throttle_of
@@ -95,7 +96,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         super().__init__(faults=of_sensors, plant_faults=of_others, **own)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (type(self), self._settings, self.state, self._applied)
+        return remade, (type(self), (), self._settings, {"state": self.state, "_applied": self._applied})
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.
@@ -128,12 +129,3 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
             bridge_open=applied["bridge_open"] != 0.0,
         )
         return Measurement(values={name: float(value) for name, value in reading.items()})
-
-
-def _restored(
-    kind: type[VirtualThrottle], given: dict[str, Any], state: dict[str, list[float]], applied: dict[str, float] | None
-) -> VirtualThrottle:
-    made = kind(**given)
-    made.state = state
-    made._applied = None if applied is None else dict(applied)
-    return made
