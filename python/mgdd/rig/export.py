@@ -146,15 +146,11 @@ def _write_netcdf(path: Path, data: xr.Dataset) -> None:
     write_netcdf(data.assign({str(name): v for name, v in small.items()}), path)
 
 
-def _write_parquet(path: Path, data: xr.Dataset) -> None:
-    write_parquet(_columns(data), path)
-
-
 _TABLE_WRITERS: Mapping[str, tuple[str, Callable[[Path, Any], None]]] = MappingProxyType(
     {
         "netcdf": (".nc", _write_netcdf),
         "csv": (".csv", _write_csv),
-        "parquet": (".parquet", _write_parquet),
+        "parquet": (".parquet", lambda path, data: write_parquet(_columns(data), path)),
     }
 )
 
