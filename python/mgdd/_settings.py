@@ -1,12 +1,14 @@
 """Keywords of a class that hands them on to the core: signature and documentation from the core's table of fields.
 
+And the way back from a pickle, which has such keywords and a state.
+
 No public part of the package.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from textwrap import wrap
 from typing import Any, TypeVar
 
@@ -50,3 +52,11 @@ def _entry(name: str, field: dict[str, Any], default: Any) -> Iterator[str]:
     if default is not None:
         text += f"; {standard!r} if left out"
     yield from (f"    {line}\n" for line in wrap(text + ".", 112))
+
+
+def remade(cls: type[Any], given: Sequence[Any], settings: Mapping[str, Any], state: Mapping[str, Any]) -> Any:
+    """Make an object of its arguments, then set by name what has changed since, as a ``__reduce__`` gives both."""
+    made = cls(*given, **settings)
+    for name, value in state.items():
+        setattr(made, name, value)
+    return made

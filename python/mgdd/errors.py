@@ -151,6 +151,12 @@ class Error(Exception):
         message = hinted(f"{field} = {shortened(shown)}: must be {bound}", str(value), known)
         return cls(message, field=field, value=value, bound=bound)
 
+    @classmethod
+    def unless(cls, holds: Any, field: str, value: Any, bound: str) -> None:
+        """Raise the error of one refused field, as `of` makes it, unless a condition holds."""
+        if not holds:
+            raise cls.of(field, value, bound)
+
     def reworded(self, message: str) -> Self:
         """Give the same error with another message, for callers that know more of where it happened.
 

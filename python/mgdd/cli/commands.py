@@ -119,17 +119,17 @@ COMMANDS = {
         "track.toml --mode bench --connection socketcan:can0 --pace real_time --json", "rig_run"),
     "rig record": Command(
         "listen on a bus and write every frame into a record, until Ctrl-C; nothing is sent",
-        "bench.rec --bus socketcan:can0 --duration-s 60", "rig_records"),
+        "bench.rec --bus socketcan:can0 --duration-s 60", "rig_run"),
     "rig replay": Command(
         "give the measurements of a recorded run to its controller again, and compare every output bit for bit; exit "
-        "code 1 where one differs", "mgdd-runs/first --json", "rig_records"),
-    "rig export": Command("write a record in the format of other tools", "run.rec run.mf4", "rig_records"),
+        "code 1 where one differs", "mgdd-runs/first --json", "rig_run"),
+    "rig export": Command("write a record in the format of other tools", "run.rec run.mf4", "rig_run"),
     "rig selftest": Command(
         "let a process that drives a simulated throttle over a bus die in six ways, and time the plate's way to "
         "limp-home; exit code 1 above 0.4 s", "--json", "rig"),
     "rig watch": Command(
         "serve a live page on this machine alone, with a stop button that opens the bridge, until Ctrl-C",
-        "mgdd-runs/first", "rig_records"),
+        "mgdd-runs/first", "rig_run"),
     "rig hub": Command(
         "join processes of this machine by a bus of the socketcand protocol, until Ctrl-C or its parent ends",
         "--port 29536 --fault drop:p=0.01", "rig"),

@@ -13,10 +13,6 @@ from mgdd.cli.output import emit
 from mgdd.io.extras import import_extra
 
 
-def _add_completion(parser: Any) -> None:
-    option(parser, "shell", "whose script", choices=("bash", "zsh"))
-
-
 def _completion(args: argparse.Namespace) -> None:
     shtab = import_extra("shtab", "completion", "a script for the completion of a shell")
     root = root_parser()
@@ -39,4 +35,6 @@ def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:
                 yield from _actions(below)
 
 
-COMMANDS = {"completion": (_add_completion, _completion)}
+COMMANDS = {
+    "completion": (lambda parser: option(parser, "shell", "whose script", choices=("bash", "zsh")), _completion),
+}

@@ -48,10 +48,6 @@ def _add_file(parser: Any) -> None:
     add_encoder(parser)
 
 
-def _add_get(parser: Any) -> None:
-    option(parser, "name", "data set", choices=tuple(FILES))
-
-
 def _given(args: argparse.Namespace) -> dict[str, Any]:
     return _OWN.given(args) | _SPEED.given(args) | READING.given(args) | encoder_of(args)
 
@@ -183,5 +179,5 @@ COMMANDS = {
     "info": (_add_file, _info),
     "convert": (_add_file, _convert),
     "list": (None, _list),
-    "get": (_add_get, _get),
+    "get": (lambda parser: option(parser, "name", "data set", choices=tuple(FILES)), _get),
 }

@@ -27,10 +27,6 @@ _GUIDED = {
 _CUT_SHORT = "\nInterrupted: these are the models that were finished, and not every check of them was made."
 
 
-def _add_demo(parser: Any) -> None:
-    _REPORT.add(parser)
-
-
 def run(args: argparse.Namespace) -> None:
     """Calibrate, write the report, run two studies; Ctrl-C keeps what is finished."""
     step = args.progress.expect(120)
@@ -157,4 +153,4 @@ def _span(best: Any, name: str, digits: int) -> str:
     return f"{own:z.{digits}f} ({low:z.{digits}f} to {high:z.{digits}f})"
 
 
-COMMANDS = {"demo": (_add_demo, run)}
+COMMANDS = {"demo": (_REPORT.add, run)}

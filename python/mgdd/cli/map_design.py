@@ -60,7 +60,23 @@ def _design(args: argparse.Namespace) -> None:
     before = _before(args, tuple(factors))
     with doubts_said() as said, named_options(n="points", existing="extend", outputs="limit"):
         plan = design_points(factors, feasible=_both(region, driven), existing=before, **_DESIGN.given(args))
-    payload = _payload(plan, limits, region, said)
+    attrs = dict(plan.attrs)
+    starts = attrs.pop("log_det_starts", None)
+    columns = {str(name): plan[name].to_numpy() for name in plan.data_vars}
+    highest = {}
+    if region is not None:
+        judged = region.evaluate(plan)
+        highest = {name: float(judged[name].max()) for name in limits}
+    payload = {
+        **attrs,
+        "points": plan.sizes["point"],
+        **({} if starts is None else {"log_det_starts": starts}),
+        "limits": dict(limits),
+        "highest": highest,
+        "warnings": said,
+        "point": plan["point"].to_numpy(),
+        "columns": columns,
+    }
     payload["within"] = args.within
     payload["existing"] = 0 if before is None else before.sizes["point"]
     emit(args, payload, text=_text(payload, plan if args.output is None else None), write=table_writers(plan))
@@ -110,28 +126,6 @@ def _before(args: argparse.Namespace, names: tuple[str, ...]) -> xr.Dataset | No
     if args.output is not None and Path(args.output).resolve() == Path(args.extend).resolve():
         raise ParameterError(f"-o {args.output}: the file of --extend; new points would replace it: name another")
     return read_points(args.extend, names, **CSV.given(args))
-
-
-def _payload(
-    plan: xr.Dataset, limits: Mapping[str, float], region: FeasibleRegion | None, said: list[str]
-) -> dict[str, Any]:
-    attrs = dict(plan.attrs)
-    starts = attrs.pop("log_det_starts", None)
-    columns = {str(name): plan[name].to_numpy() for name in plan.data_vars}
-    highest = {}
-    if region is not None:
-        judged = region.evaluate(plan)
-        highest = {name: float(judged[name].max()) for name in limits}
-    return {
-        **attrs,
-        "points": plan.sizes["point"],
-        **({} if starts is None else {"log_det_starts": starts}),
-        "limits": dict(limits),
-        "highest": highest,
-        "warnings": said,
-        "point": plan["point"].to_numpy(),
-        "columns": columns,
-    }
 
 
 def _text(payload: dict[str, Any], shown: xr.Dataset | None) -> list[str | Table]:

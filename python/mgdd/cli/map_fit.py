@@ -71,7 +71,9 @@ def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
     elif Path(args.file).suffix.lower() == ".csv":
         raise ParameterError(f"--factors is needed: which columns of {args.file} make {args.response}")
     else:
-        factors = _inputs(args.file, args.response)
+        factors = list(input_names(read_netcdf(args.file), args.response))
+        if not factors:
+            raise ParameterError(f"--factors is needed: {args.file} does not say which of its columns are inputs")
     table = read_points(args.file, [*factors, args.response], **CSV.given(args))
     known = np.all([np.isfinite(column.to_numpy()) for column in table.data_vars.values()], axis=0)
     gone = int((~known).sum())
@@ -80,14 +82,6 @@ def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
     if gone:
         warn(f"{gone} of {known.size} points have no value (NaN) and are left out", of=args.file)
     return table.isel({POINT: known}), gone
-
-
-def _inputs(file: str, response: str) -> list[str]:
-    """Name the inputs of a sweep: axes of its grid, or coordinates of its points."""
-    inputs = list(input_names(read_netcdf(file), response))
-    if not inputs:
-        raise ParameterError(f"--factors is needed: {file} does not say which of its columns are inputs")
-    return inputs
 
 
 def _figures(fit: Fit, factors: Sequence[str]) -> dict[str, Any]:

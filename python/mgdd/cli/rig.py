@@ -13,7 +13,7 @@ from typing import Any
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import option, refuse_idle, require_positive
 from mgdd.cli.output import check_file, emit
-from mgdd.cli.rig_records import add_bus
+from mgdd.cli.rig_run import add_bus
 from mgdd.report import Table
 from mgdd.rig import Experiment, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub import Hub
@@ -129,10 +129,6 @@ def _say(args: argparse.Namespace, text: str) -> None:
     print(text, file=sys.stderr if args.json else sys.stdout, flush=True)
 
 
-def _add_selftest(parser: Any) -> None:
-    _SELF_TEST.add(parser)
-
-
 def _selftest(args: argparse.Namespace) -> None:
     how = _SELF_TEST.of(args)
     test = run_self_test(progress=args.progress.expect(len(WAYS_OF[how["loop"]])), **how)
@@ -146,4 +142,4 @@ def _selftest(args: argparse.Namespace) -> None:
         args.exit_code = _FAILED
 
 
-COMMANDS = {"hub": (_add_hub, _hub), "node": (_add_node, _node), "selftest": (_add_selftest, _selftest)}
+COMMANDS = {"hub": (_add_hub, _hub), "node": (_add_node, _node), "selftest": (_SELF_TEST.add, _selftest)}

@@ -1,20 +1,29 @@
-"""`mgdd rig run | check`: an experiment from a file, and what it would do."""
+"""`mgdd rig run | check | record | replay | export | watch`: experiments from a file, and the records of a bus."""
 
 from __future__ import annotations
 
 import argparse
+import math
+import os
 import sys
+import time
+import webbrowser
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from html import escape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import option, refuse_idle
+from mgdd.cli.options import option, refuse_idle, require_positive
 from mgdd.cli.output import emit, lines, warn, wrote
 from mgdd.cli.progress import Stopped
-from mgdd.rig import CanRig, Experiment, run_experiment
+from mgdd.errors import DataError, ParameterError
+from mgdd.rig import CanRig, Experiment, Recorder, export_record, run_experiment, watch
 from mgdd.rig.can.can_rig import MODES
+from mgdd.rig.can.replay_bus import RecordedBus
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment import CheckedExperiment, ExperimentResult, check_experiment
 
 if TYPE_CHECKING:
@@ -98,4 +107,134 @@ def _listen(checked: CheckedExperiment) -> dict[str, Any]:
         return {"connection": checked.experiment.bus.connection, "state": rig.state, **rig.counters}
 
 
-COMMANDS = {"run": (_add_run, _run), "check": (_add_experiment, _check)}
+_KEEP, _EXPORT = Options(run_experiment, "folder"), Options(export_record, "kind")
+_POLL_S = 0.1
+_SYNC_S = 1.0
+_DIFFERENT = 1
+
+
+def _add_record(parser: Any) -> None:
+    option(parser, "file FILE.rec", "new record")
+    add_bus(parser)
+    option(parser, "--duration-s X", "end after this time (default: never)")
+
+
+def _add_replay(parser: Any) -> None:
+    option(parser, "source DIR", "folder of a run, with experiment.toml and run.rec")
+    _KEEP.add(parser)
+
+
+def _add_export(parser: Any) -> None:
+    option(parser, "file FILE.rec", "record")
+    option(parser, "target TARGET", "file, or a new folder for netcdf, csv and parquet")
+    _EXPORT.add(parser)
+
+
+def add_bus(parser: argparse.ArgumentParser) -> None:
+    """Add the bus of a command that needs one."""
+    what = "any interface of python-can, ?OPTION=VALUE&... behind"
+    option(parser, "--bus INTERFACE:CHANNEL", what, required=True)
+
+
+def _record(args: argparse.Namespace) -> None:
+    require_positive(args, "duration_s")
+    transport, frames = CanTransport.parse(args.bus), 0
+    with transport, Recorder(args.file, config={"bus": args.bus}) as recorder:
+        synced = time.monotonic()  # the bus is open: python-can may take longer than a short recording
+        ends = math.inf if args.duration_s is None else synced + args.duration_s
+        bus = RecordedBus(transport, recorder)
+        args.progress(f"listening on {bus.name}")
+        try:
+            while time.monotonic() < ends:
+                frames += bus.receive(_POLL_S) is not None
+                if time.monotonic() - synced > _SYNC_S:
+                    recorder.sync()
+                    synced = time.monotonic()
+        except KeyboardInterrupt:
+            recorder.event("note", "ended by Ctrl-C")
+        counted = {"frames": frames, **transport.counters}
+    emit(args, {"file": args.file, **counted})
+    wrote(args.file)
+
+
+def _replay(args: argparse.Namespace) -> None:
+    folder = Path(args.source)
+    for name in ("experiment.toml", "run.rec"):
+        if not (folder / name).is_file():
+            raise DataError(f"{folder}: holds no {name}: give the folder of a run of `mgdd rig run`")
+    experiment = Experiment.load(folder / "experiment.toml").with_mode("replay", record=(folder / "run.rec").resolve())
+    result = run_experiment(check_experiment(experiment), **_KEEP.given(args))
+    compared = result.counters["replay"]
+    same = compared["different"] == 0 and compared["samples"] > 0
+    verdict = "every output is the recorded one, bit for bit" if same else "the outputs differ"
+    emit(args, {"same": same, "replay": compared, "result": result.figures}, text=f"{lines(compared)}\n\n{verdict}")
+    if not same:
+        args.exit_code = _DIFFERENT
+
+
+def _export(args: argparse.Namespace) -> None:
+    written = [str(path) for path in export_record(args.file, args.target, **_EXPORT.given(args))]
+    emit(args, {"files": written}, text="\n".join(written))
+
+
+_LAST_PORT = 65_535
+_NICE = 10  # a loop that is late costs more than a picture that is
+_OPTIONS = Options(watch, "port", signal_map="map")
+
+
+def _add_watch(parser: Any) -> None:
+    option(parser, "source RUN | FILE.rec | INTERFACE:CHANNEL | simulate",
+           "folder of a run that goes on or is over, a record, a bus to listen on, or a simulated throttle",
+           default="simulate", nargs="?")  # fmt: skip
+    _OPTIONS.add(parser)
+    option(parser, "--no-browser", "print the address and open nothing")
+
+
+def _way_to(address: str, folder: Path) -> Path:
+    """Write a page that leads to the address: all users of the machine may read the arguments of a browser."""
+    file = folder / "mgdd.html"  # in a folder of this user alone
+    file.write_text(
+        f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={escape(address)}">'
+        f'<title>mgdd rig watch</title><a href="{escape(address)}">mgdd rig watch</a>\n',
+        encoding="utf-8",
+    )
+    return file
+
+
+def _watch(args: argparse.Namespace) -> None:
+    from mgdd.io.extras import import_extra
+    from mgdd.rig.can.node import parent_watch
+    from mgdd.rig.live.page import serve
+    from mgdd.rig.live.sources import source_of
+
+    how = _OPTIONS.of(args)
+    if not 0 <= how["port"] <= _LAST_PORT:
+        raise ParameterError.of("--port", how["port"], f"0 to {_LAST_PORT}")
+    import_extra("bokeh", "watch", "a live page")  # before a simulation is started
+    args.progress.close()
+    source = source_of(args.source, how["signal_map"])
+
+    with TemporaryDirectory(prefix="mgdd-watch-", ignore_cleanup_errors=True) as folder:
+
+        def ready(address: str) -> None:
+            if hasattr(os, "nice"):
+                os.nice(_NICE)  # now that the simulation has begun: that one shall not yield
+            print(address, file=sys.stderr if args.json else sys.stdout, flush=True)
+            if not args.no_browser:
+                webbrowser.open(_way_to(address, Path(folder)).as_uri())
+
+        try:
+            serve(source, how["port"], ready, alive=parent_watch())
+        finally:
+            source.close()
+    emit(args, {"watched": source.name, "said": source.said, "trouble": source.trouble})
+
+
+COMMANDS = {
+    "run": (_add_run, _run),
+    "check": (_add_experiment, _check),
+    "record": (_add_record, _record),
+    "replay": (_add_replay, _replay),
+    "export": (_add_export, _export),
+    "watch": (_add_watch, _watch),
+}

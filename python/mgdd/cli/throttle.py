@@ -91,7 +91,9 @@ def _add_demand(parser: Any) -> None:
 
 
 def _demand(args: argparse.Namespace) -> None:
-    chain = _chain(args)
+    chain = DemandChain() if args.chain is None else DemandChain.of_file(ParameterFile.read(args.chain))
+    fields = {name: field for name, field in DemandChain.fields().items() if name != "pedal_map"}
+    chain = chain.replace(**changes_of(args, fields))
     steady = chain.steady(args.pedal_percent, args.speed_rpm).isel(pedal_percent=0, speed_rpm=0)
     numbers = {str(name): float(steady[name]) for name in steady.data_vars}
     payload = {
@@ -104,12 +106,6 @@ def _demand(args: argparse.Namespace) -> None:
         "parameters": {name: value for name, value in chain.to_dict().items() if name != "pedal_map"},
     }
     emit(args, payload)
-
-
-def _chain(args: argparse.Namespace) -> DemandChain:
-    chain = DemandChain() if args.chain is None else DemandChain.of_file(ParameterFile.read(args.chain))
-    fields = {name: field for name, field in DemandChain.fields().items() if name != "pedal_map"}
-    return chain.replace(**changes_of(args, fields))
 
 
 _TIME = Options(simulate_throttle, "duration_s", "sample_s")

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from numpy.typing import ArrayLike
 
 from mgdd import _core
-from mgdd._settings import takes_settings_of
+from mgdd._settings import remade, takes_settings_of
 from mgdd.errors import ParameterError, did_you_mean
 
 _MOST_STATES = 32  # of an object that guides, as in the core
@@ -178,13 +178,7 @@ class Mgdd1:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle settings, guide and state."""
-        return _restored, (self.guide, self.settings, self.state)
-
-
-def _restored(guide: Any | None, settings: dict[str, Any], state: dict[str, list[float]]) -> Mgdd1:
-    made = Mgdd1(guide, **settings)
-    made.state = state
-    return made
+        return remade, (Mgdd1, (self.guide,), self.settings, {"state": self.state})
 
 
 def _made(guide: Any | None, settings: dict[str, Any]) -> Any:

@@ -137,19 +137,15 @@ def read(
     if not (checked and mask_held):
         raise ParameterError("checked, mask_held: only 'h2df_502' has them")
     if name == HD:
-        return _hd_traces()
+        conditions = read_conditions(path(HD, f"{HD}_conditions.csv"))
+        file = path(HD, f"{HD}_traces.csv")
+        traces = []
+        for column, values in conditions.items():
+            trace = read_pressure(file, angle_column="crank_angle_cad", pressure_column=column)
+            traces.append(trace.assign_attrs(file=column, **values))
+        return traces
     one, other = (engine_map(path(name, file)) for file in FILES[name])
     return one, other
-
-
-def _hd_traces() -> list[xr.Dataset]:
-    conditions = read_conditions(path(HD, f"{HD}_conditions.csv"))
-    file = path(HD, f"{HD}_traces.csv")
-    traces = []
-    for column, values in conditions.items():
-        trace = read_pressure(file, angle_column="crank_angle_cad", pressure_column=column)
-        traces.append(trace.assign_attrs(file=column, **values))
-    return traces
 
 
 def _h2df_cycles(*, checked: bool, mask_held: bool) -> xr.Dataset:

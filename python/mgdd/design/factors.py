@@ -134,11 +134,9 @@ def _factor(name: str, given: Any) -> Factor:
         raise ParameterError.of(f"factors: {name}", given, need) from error
     if values.ndim != 1 or values.size < 2:
         raise ParameterError.of(f"factors: {name}", given, f"{need}; leave a constant out of the factors")
-    if not np.isfinite(values).all():
-        raise ParameterError.of(f"factors: {name}", given, "finite numbers")
+    ParameterError.unless(np.isfinite(values).all(), f"factors: {name}", given, "finite numbers")
     if values.size == 2 and not isinstance(given, AbstractSet):
-        if not values[0] < values[1]:
-            raise ParameterError.of(f"factors: {name}", given, "(low, high) with low < high")
+        ParameterError.unless(values[0] < values[1], f"factors: {name}", given, "(low, high) with low < high")
         return Factor(name=name, low=float(values[0]), high=float(values[1]))
     levels = np.unique(values)
     if levels.size < values.size:

@@ -106,7 +106,16 @@ def design_points(
     [-20.0, -20.0, -8.0, -8.0, 4.0, 4.0]
     """
     checked = factors_of(factors)
-    _check(method, n, model, n_starts, seed)
+    for name, value, choices in (("method", method, METHODS), ("model", model, MODELS)):
+        ParameterError.unless(value in choices, name, value, f"one of {', '.join(choices)}")
+    if method == "factorial":
+        if n is not None:
+            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial determine the number of points")
+    elif n is None or isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= 1_000_000:
+        raise ParameterError.of(argument("n"), n, f"a whole number in [1, 1000000] for method {method!r}")
+    for name, count, least in (("n_starts", n_starts, 1), ("seed", seed, 0)):
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
+            raise ParameterError.of(name, count, f"a whole number >= {least}")
     counts = _levels(checked, levels, 3 if method == "factorial" else 5)
     before = np.empty((0, len(checked.items))) if existing is None else checked.existing(existing)
 
@@ -240,17 +249,3 @@ def _levels(factors: Factors, levels: int | Mapping[str, int] | None, usual: int
             raise ParameterError.of(f"levels: {factor.name}", count, "a whole number in [2, 1000]")
         out[factor.name] = int(count) if factor.levels is None else factor.levels.size
     return out
-
-
-def _check(method: str, n: int | None, model: str, n_starts: int, seed: int) -> None:
-    for name, value, choices in (("method", method, METHODS), ("model", model, MODELS)):
-        if value not in choices:
-            raise ParameterError.of(name, value, f"one of {', '.join(choices)}")
-    if method == "factorial":
-        if n is not None:
-            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial determine the number of points")
-    elif n is None or isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= 1_000_000:
-        raise ParameterError.of(argument("n"), n, f"a whole number in [1, 1000000] for method {method!r}")
-    for name, count, least in (("n_starts", n_starts, 1), ("seed", seed, 0)):
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
-            raise ParameterError.of(name, count, f"a whole number >= {least}")

@@ -158,8 +158,7 @@ class FeasibleRegion:
         if not callable(indicators):
             raise ParameterError.of("indicators", indicators, "a function of columns that returns columns")
         checked = limits_of(limits)
-        if not checked:
-            raise ParameterError.of("limits", limits, "at least one upper limit, for example {'p_max_bar': 150.0}")
+        ParameterError.unless(checked, "limits", limits, "at least one upper limit, for example {'p_max_bar': 150.0}")
         return cls(_Modelled(indicators=indicators, limits=checked))
 
     @classmethod

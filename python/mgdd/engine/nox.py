@@ -131,8 +131,7 @@ def nox_at_reference_humidity(
     >>> float(nox_at_reference_humidity(700.5, 0.022).round(1))
     736.2
     """
-    if ignition not in _HUMIDITY:
-        raise ParameterError.of("ignition", ignition, f"one of {', '.join(_HUMIDITY)}")
+    ParameterError.unless(ignition in _HUMIDITY, "ignition", ignition, f"one of {', '.join(_HUMIDITY)}")
     slope, constant = _HUMIDITY[ignition]
     water = _checked("intake_water_fraction", intake_water_fraction, least=0.0, most=0.1)
     return np.asarray(_checked("nox_ppm", nox_ppm, least=0.0) * (slope * water + constant))

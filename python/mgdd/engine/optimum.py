@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._arguments import require_plain
-from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError, hinted
 from mgdd.optimize.optimum import Optimum, idle_limits, limits_of
@@ -84,7 +84,13 @@ def find_optimum(
     caps = {limit.name: limit.upper - limit.margin for limit in checked}
     low, high = bounds_cad or (max(DEFAULT_CAD[0], cylinder.ivc_cad), min(DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
     check_request(objective, caps)
-    _check(point, low, high)
+    if not point.fuel_mg > 0.0:
+        raise ParameterError(f"fuel_mg = {point.fuel_mg:g}: an optimum needs fuel > 0")
+    if not _WINDOW_CAD[0] <= low < high <= _WINDOW_CAD[1]:
+        raise ParameterError(
+            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in "
+            f"[{_WINDOW_CAD[0]:g}, {_WINDOW_CAD[1]:g}] °CA aTDC"
+        )
 
     def indicators(soc: float | np.ndarray) -> dict[str, np.ndarray]:
         return _core.engine.scan(cylinder, point, np.atleast_1d(np.asarray(soc, float)), step_cad, integrator)
@@ -196,20 +202,9 @@ def _curvature(
 
 def check_request(objective: str, limits: Iterable[str], also: Iterable[str] = ()) -> None:
     """Refuse an unknown objective or limit before any work; `also` are limits besides indicators."""
-    if objective not in OBJECTIVES:
-        raise ParameterError.of("objective", objective, f"one of {', '.join(OBJECTIVES)}")
+    ParameterError.unless(objective in OBJECTIVES, "objective", objective, f"one of {', '.join(OBJECTIVES)}")
     names = [*_core.engine.indicator_units(), *also]
     for name in limits:
         if name not in names:
             refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(names)}"
             raise ParameterError(hinted(refused, name, [other for other in names if unit_of(other) != _PLACE]))
-
-
-def _check(point: OperatingPoint, low: float, high: float) -> None:
-    if not point.fuel_mg > 0.0:
-        raise ParameterError(f"fuel_mg = {point.fuel_mg:g}: an optimum needs fuel > 0")
-    if not _WINDOW_CAD[0] <= low < high <= _WINDOW_CAD[1]:
-        raise ParameterError(
-            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in "
-            f"[{_WINDOW_CAD[0]:g}, {_WINDOW_CAD[1]:g}] °CA aTDC"
-        )

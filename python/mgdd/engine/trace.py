@@ -324,22 +324,19 @@ def _bmep(
     if torque is None:
         return None
     cylinders = int(trace.attrs.get("n_cylinders", cylinders)) if cylinders == 1 else cylinders
-    if cylinders < 1:
-        raise ParameterError.of("n_cylinders", cylinders, ">= 1")
+    ParameterError.unless(cylinders >= 1, "n_cylinders", cylinders, ">= 1")
     return 4.0 * math.pi * torque / (cylinder.swept_volume_l * 1e-3 * cylinders) / 1e5
 
 
 def _fuel_heat(trace: xr.Dataset, cylinder: Cylinder, fuel_mg: float | None) -> float | None:
     """Heat [J] of the fuel that is stated for this trace; mg times MJ/kg are J."""
     fuel = _number(trace, "fuel_mg", fuel_mg)
-    if fuel_mg is not None and not 0.0 < fuel_mg < math.inf:
-        raise ParameterError.of("fuel_mg", fuel_mg, "> 0 mg per cycle")
+    ParameterError.unless(fuel_mg is None or 0.0 < fuel_mg < math.inf, "fuel_mg", fuel_mg, "> 0 mg per cycle")
     return fuel * cylinder.lower_heating_value_mj_per_kg if fuel else None
 
 
 def _gamma(gamma: float | str) -> tuple[str, float, float | str]:
     if isinstance(gamma, str):
-        if gamma not in ("split", "cylinder"):
-            raise ParameterError.of("gamma", gamma, "a number, split or cylinder")
+        ParameterError.unless(gamma in ("split", "cylinder"), "gamma", gamma, "a number, split or cylinder")
         return gamma, 1.33, gamma
     return "constant", float(gamma), float(gamma)

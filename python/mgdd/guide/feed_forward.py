@@ -123,8 +123,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
     ) -> None:
         if guide is not None and not callable(guide):
             raise ParameterError.of("guide", guide, "None or a function of the operating point")
-        if not isinstance(keep_start, bool | np.bool_):
-            raise ParameterError.of("keep_start", keep_start, "True or False")
+        ParameterError.unless(isinstance(keep_start, bool | np.bool_), "keep_start", keep_start, "True or False")
         settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
             "trust": trust,

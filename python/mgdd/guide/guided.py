@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from mgdd._settings import remade
 from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
@@ -116,10 +117,12 @@ class Guided(SeekerFindings, _CoreGuided):
         return self._as(type(self), *arguments, **named)
 
     def _as(self, cls: type[Any], *arguments: Any, **named: Any) -> Any:
-        return _rebuild(cls, arguments, named, self._options, self.state, [])
+        return remade(cls, arguments, named | self._options, {"state": self.state})
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), *self._arguments(), self._options, self.state, list(self._rows))
+        arguments, named = self._arguments()
+        changed = {"state": self.state, "_rows": list(self._rows)}
+        return remade, (type(self), arguments, named | self._options, changed)
 
     def __repr__(self) -> str:
         at = np.array2string(self.estimate, precision=6)
@@ -131,17 +134,3 @@ class Guided(SeekerFindings, _CoreGuided):
     def _repr_html_(self) -> str:
         shown = {name: getattr(self, name) for name in self._shown}
         return as_html(type(self).__name__, rows_of({**self._standing(), **shown, **self._options}))
-
-
-def _rebuild(
-    cls: type[Any],
-    arguments: tuple[Any, ...],
-    named: dict[str, Any],
-    options: dict[str, Any],
-    state: Any,
-    rows: list[tuple[Any, ...]],
-) -> Any:
-    made = cls(*arguments, **named, **options)
-    made.state = state
-    made._rows = rows
-    return made

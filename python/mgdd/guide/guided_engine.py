@@ -107,8 +107,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
         noise_sd: float | None = None,
         keep_start: bool = False,
     ) -> None:
-        if not isinstance(model, ModelOptimum):
-            raise ParameterError.of("model", model, "a ModelOptimum")
+        ParameterError.unless(isinstance(model, ModelOptimum), "model", model, "a ModelOptimum")
         if calibration is not None and not isinstance(calibration, OnlineCalibration):
             raise ParameterError.of("calibration", calibration, "an OnlineCalibration, or None")
         self._options: dict[str, Any] = {

@@ -9,6 +9,7 @@ from typing import Any
 from mgdd import _core
 from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance
 from mgdd._core.guide import Curve
+from mgdd._settings import remade
 from mgdd.errors import ParameterError
 from mgdd.optimize.optimum import Optimum
 from mgdd.presets.meant import CylinderLike, cylinder_of
@@ -199,7 +200,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
         self._optima.clear()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), self.cylinder, self.settings)
+        return remade, (type(self), (self.cylinder,), self.settings, {})
 
     def __repr__(self) -> str:
         return f"<ModelOptimum by {self.settings['method']}, {len(self._optima)} points searched>"
@@ -209,9 +210,4 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
 
 def _require_point(point: Any) -> None:
-    if not isinstance(point, OperatingPoint):
-        raise ParameterError.of("point", point, "an OperatingPoint")
-
-
-def _rebuild(cls: type[ModelOptimum], cylinder: Cylinder, settings: dict[str, Any]) -> ModelOptimum:
-    return cls(cylinder, **settings)
+    ParameterError.unless(isinstance(point, OperatingPoint), "point", point, "an OperatingPoint")

@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import OperatingPoint
+from mgdd._settings import remade
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, rows_of
@@ -138,8 +139,7 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
         step_cad: float = 1.0,
         integrator: str = "trapezoid",
     ) -> None:
-        if isinstance(parameters, str):
-            raise ParameterError.of("parameters", parameters, "a sequence of names")
+        ParameterError.unless(not isinstance(parameters, str), "parameters", parameters, "a sequence of names")
         super().__init__(
             cylinder=cylinder_of(cylinder),
             method=method,
@@ -280,7 +280,8 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
         return labelled_dataset(variables, attrs={"method": self.settings["method"]})
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (self.settings, self.state, self._history)
+        changed = {"state": self.state, "_history": list(self._history)}
+        return remade, (OnlineCalibration, (), self.settings, changed)
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} {self.parameters[name]:.4g}" for name in self.settings["parameters"])
@@ -288,12 +289,3 @@ class OnlineCalibration(_core.guide.OnlineCalibration):
 
     def _repr_html_(self) -> str:
         return as_html("OnlineCalibration", rows_of({"status": self.status, **self.parameters, **self.settings}))
-
-
-def _rebuild(
-    settings: dict[str, Any], state: dict[str, list[float]], history: list[tuple[str, list[float]]]
-) -> OnlineCalibration:
-    made = OnlineCalibration(**settings)
-    made.state = state
-    made._history = list(history)
-    return made

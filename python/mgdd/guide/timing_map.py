@@ -66,10 +66,8 @@ class TimingMap:
 
     def __post_init__(self) -> None:
         self.table = map_of(self.table)
-        if not 0.0 < self.prior_sd_cad < math.inf:
-            raise ParameterError.of("prior_sd_cad", self.prior_sd_cad, "> 0 and finite")
-        if not 0.0 < self.forgetting <= 1.0:
-            raise ParameterError.of("forgetting", self.forgetting, "in (0, 1]")
+        ParameterError.unless(0.0 < self.prior_sd_cad < math.inf, "prior_sd_cad", self.prior_sd_cad, "> 0 and finite")
+        ParameterError.unless(0.0 < self.forgetting <= 1.0, "forgetting", self.forgetting, "in (0, 1]")
         if self.table.unit != _TIMING:
             raise DataError(f"{self.table.name} has unit {self.table.unit!r}: a timing map needs {_TIMING!r}")
         empty = np.count_nonzero(np.isnan(self.table.values))
@@ -171,8 +169,7 @@ class TimingMap:
 
 def _settled_estimate(history: xr.Dataset, cycles: int, spread: float) -> tuple[float, float] | None:
     """Give mean and standard deviation of the last cycles of a seeker with one input; None where they do not agree."""
-    if cycles < 2:
-        raise ParameterError.of("cycles", cycles, ">= 2")
+    ParameterError.unless(cycles >= 2, "cycles", cycles, ">= 2")
     last = history.isel(cycle=slice(-cycles, None))
     if last.sizes["cycle"] < cycles:
         return None

@@ -128,12 +128,9 @@ def fit_ode(
     state = np.array(initial_state, dtype=np.float64)
     if state.ndim != 1 or not np.isfinite(state).all():
         raise ShapeError("initial_state: must be a vector of finite numbers, one per state")
-    if not 0 <= skip < time.size:
-        raise ParameterError.of("skip", skip, f"within [0, {time.size - 1}]")
-    if not (np.isfinite(sigma) and sigma > 0.0):
-        raise ParameterError.of("sigma", sigma, "> 0")
-    if substeps < 1:
-        raise ParameterError.of("substeps", substeps, ">= 1")
+    ParameterError.unless(0 <= skip < time.size, "skip", skip, f"within [0, {time.size - 1}]")
+    ParameterError.unless(np.isfinite(sigma) and sigma > 0.0, "sigma", sigma, "> 0")
+    ParameterError.unless(substeps >= 1, "substeps", substeps, ">= 1")
     names = list(parameters)
     chosen = names if free is None else [name for name in names if name in set(free)]
     free_states = [f"state_{i}" for i in free_state]

@@ -183,8 +183,7 @@ def _unit_of(text: str) -> str | None:
 
 def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
     """Refuse a keyword value outside its list, naming both."""
-    if value not in allowed:
-        raise DataError.of(name, value, f"one of {', '.join(map(repr, allowed))}")
+    DataError.unless(value in allowed, name, value, f"one of {', '.join(map(repr, allowed))}")
 
 
 def stated_unit(name: str, units_row: str | None = None) -> str | None:

@@ -185,8 +185,21 @@ def check_trace(
         degrees = np.rad2deg(degrees)
     check_span(degrees, angle_unit, source)
     _check_order(degrees, place)
-    _check_convention(degrees, source)
-    _check_gap(degrees, place)
+    first, last = float(degrees[0]), float(degrees[-1])
+    whole = first < 30.0 - 360.0 and last > 360.0 - 30.0  # a whole cycle may begin a little off, or be shifted
+    reach = 390.0 if whole else 360.5
+    if first < -reach or last > reach:
+        raise DataError(
+            f"{source}: crank angles run from {first:g} to {last:g}: this looks like a 0..720 record; "
+            f"{CONVENTION}; {_remedy_0_720()}"
+        )
+    wide, median = wide_steps(degrees)
+    if wide:
+        index = wide[0]
+        raise DataError(
+            f"{place.row(index)}: gap in the crank angle from {degrees[index - 1]:g} to {degrees[index]:g}: "
+            f"the usual step is {median:g}; fill it or cut the trace there"
+        )
     bar = to_bar(values, unit)
     check_magnitude(degrees, values, unit, source, unit_of_file)
     if bar.ndim == 2:
@@ -195,7 +208,14 @@ def check_trace(
         if (cycle := next(odd, None)) is not None:
             check_magnitude(degrees, values[cycle], unit, f"{source}, cycle {cycle + 1}", unit_of_file)
     mean = bar if bar.ndim == 1 else bar.mean(axis=0)
-    _check_peak(degrees, mean, source)
+    top = int(np.argmax(mean))
+    inside = mean[np.abs(degrees) <= 90.0]
+    near = float(inside.max()) if inside.size else 0.0
+    if np.ptp(degrees) >= 180.0 and mean[top] > 2.0 * near:
+        raise DataError(
+            f"{source}: the highest pressure {mean[top]:g} bar is at {degrees[top]:g}, far from firing "
+            f"TDC: {CONVENTION}; {_remedy_0_720()}"
+        )
     _check_tdc(degrees, mean, source)
     return degrees, bar
 
@@ -247,38 +267,6 @@ def _check_order(degrees: NDArray[np.float64], place: Place) -> None:
     if before - here > 300.0:
         remedy = "this looks like the start of another cycle; mgdd.io.pressure_trace cuts cycles"
     raise DataError(f"{place.row(index)}: crank angle {here:g} follows {before:g}: angles must rise; {remedy}")
-
-
-def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
-    first, last = float(degrees[0]), float(degrees[-1])
-    whole = first < 30.0 - 360.0 and last > 360.0 - 30.0  # a whole cycle may begin a little off, or be shifted
-    reach = 390.0 if whole else 360.5
-    if first < -reach or last > reach:
-        raise DataError(
-            f"{source}: crank angles run from {first:g} to {last:g}: this looks like a 0..720 record; "
-            f"{CONVENTION}; {_remedy_0_720()}"
-        )
-
-
-def _check_gap(degrees: NDArray[np.float64], place: Place) -> None:
-    wide, median = wide_steps(degrees)
-    if wide:
-        index = wide[0]
-        raise DataError(
-            f"{place.row(index)}: gap in the crank angle from {degrees[index - 1]:g} to {degrees[index]:g}: "
-            f"the usual step is {median:g}; fill it or cut the trace there"
-        )
-
-
-def _check_peak(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: str) -> None:
-    top = int(np.argmax(bar))
-    inside = bar[np.abs(degrees) <= 90.0]
-    near = float(inside.max()) if inside.size else 0.0
-    if np.ptp(degrees) >= 180.0 and bar[top] > 2.0 * near:
-        raise DataError(
-            f"{source}: the highest pressure {bar[top]:g} bar is at {degrees[top]:g}, far from firing "
-            f"TDC: {CONVENTION}; {_remedy_0_720()}"
-        )
 
 
 def _check_tdc(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: str) -> None:

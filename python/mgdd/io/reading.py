@@ -73,10 +73,8 @@ class Reading:
                 f"{argument('encoder')} gives no TDC: pass {argument('firing_tdc_deg', '')} with the angle of "
                 "TDC behind the mark of the turn, 0 to 360"
             )
-        if not 0.0 <= self.firing_tdc_deg <= CYCLE_DEG:
-            raise DataError.of("firing_tdc_deg", self.firing_tdc_deg, "in [0, 720]")
+        DataError.unless(0.0 <= self.firing_tdc_deg <= CYCLE_DEG, "firing_tdc_deg", self.firing_tdc_deg, "in [0, 720]")
 
 
 def _check_range(name: str, value: float | None, low: float, high: float) -> None:
-    if value is not None and not low < value <= high:
-        raise DataError.of(name, value, f"> {low:g} and <= {high:g}")
+    DataError.unless(value is None or low < value <= high, name, value, f"> {low:g} and <= {high:g}")

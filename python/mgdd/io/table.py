@@ -236,8 +236,7 @@ def read_table(
 
 def check_text_options(delimiter: str | None, decimal: str) -> None:
     """Refuse a decimal mark that is not one, or that separates columns too."""
-    if decimal not in (".", ","):
-        raise DataError.of("decimal", decimal, "'.' or ','")
+    DataError.unless(decimal in (".", ","), "decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
 

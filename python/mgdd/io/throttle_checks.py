@@ -79,12 +79,6 @@ def _place_of(log: xr.Dataset) -> Place:
 
 def check_samples(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
     """Refuse columns that are not finite, and a time that is none."""
-    _check_finite(columns, place)
-    _check_time(columns, place)
-
-
-def _check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
-    """Refuse NaN, infinity, and numbers whose differences and squares would be infinite."""
     for name, values in columns.items():
         bad = np.flatnonzero(~(np.abs(values) < _INFINITE))
         if bad.size:
@@ -95,6 +89,7 @@ def _check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> N
                 f"{place.cell(at, name)}: {values[at]} is {what}{more}: repair it or cut the log; keep one part with "
                 f"{argument('start_s', '')} or {argument('stop_s', '')}"
             )
+    _check_time(columns, place)
 
 
 def _check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:

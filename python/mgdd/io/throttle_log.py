@@ -171,8 +171,7 @@ def read_throttle_log(
     for key, unit in given.items():
         if unit is not None:
             check_choice(_ASKED[key], unit, _UNITS[key])
-    if not 0.0 < travel_deg <= 95.0:
-        raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
+    ParameterError.unless(0.0 < travel_deg <= 95.0, "travel_deg", travel_deg, "in (0, 95]")
     columns_asked = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
     columns, place, units = _read(path, columns_asked, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
     scales = {"time_s": 0.001 if units["time_s"] == "ms" else 1.0, "duty": 0.01 if units["duty"] == "%" else 1.0}
@@ -295,8 +294,7 @@ def _resampled(
     columns: dict[str, NDArray[np.float64]], sample_s: float, place: Place
 ) -> tuple[dict[str, NDArray[np.float64]], Place]:
     time = columns["time_s"]
-    if not 0.0 < sample_s <= 0.1:
-        raise ParameterError.of("sample_s", sample_s, "in (0, 0.1] s")
+    ParameterError.unless(0.0 < sample_s <= 0.1, "sample_s", sample_s, "in (0, 0.1] s")
     even = time[0] + sample_s * np.arange(math.floor((time[-1] - time[0]) / sample_s * (1.0 + 1e-12)) + 1)
     held = np.clip(np.searchsorted(time, even + 1e-9 * sample_s, side="right") - 1, 0, time.size - 1)
     out = {key: np.interp(even, time, values) for key, values in columns.items()}

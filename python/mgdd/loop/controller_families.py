@@ -53,29 +53,25 @@ def groups_of(model: Any) -> Groups:
     numbers = getattr(model, "parameters", None)
     if isinstance(numbers, Mapping):
         if "beta_above_duty" in numbers:
-            return _of_groups(model, numbers)
+            plate = Plate(
+                gain_deg_per_s2=numbers["gain_deg_per_s2_per_duty"],
+                time_constant_s=numbers["tau_s"],
+                electrical_s=numbers["electrical_s"],
+                friction=numbers["delta_duty"],
+                limp_home_deg=numbers["limp_home_deg"],
+                preload_above=numbers["beta_above_duty"],
+                preload_below=numbers["beta_below_duty"],
+                spring_above_per_deg=numbers["kappa_above_duty_per_deg"],
+                spring_below_per_deg=numbers["kappa_below_duty_per_deg"],
+                closed_deg=model.closed_deg,
+                open_deg=model.open_deg,
+            )
+            return Groups(plate, numbers["delay_samples"] * model.sample_s)
         if getattr(model, "kind", None) == "pw_r":
             return _of_pw_r(numbers)
     raise ParameterError.of(
         "model", model, "a Throttle, PW-R or fitted first-principle groups: other models have no groups to design with"
     )
-
-
-def _of_groups(model: Any, numbers: Mapping[str, float]) -> Groups:
-    plate = Plate(
-        gain_deg_per_s2=numbers["gain_deg_per_s2_per_duty"],
-        time_constant_s=numbers["tau_s"],
-        electrical_s=numbers["electrical_s"],
-        friction=numbers["delta_duty"],
-        limp_home_deg=numbers["limp_home_deg"],
-        preload_above=numbers["beta_above_duty"],
-        preload_below=numbers["beta_below_duty"],
-        spring_above_per_deg=numbers["kappa_above_duty_per_deg"],
-        spring_below_per_deg=numbers["kappa_below_duty_per_deg"],
-        closed_deg=model.closed_deg,
-        open_deg=model.open_deg,
-    )
-    return Groups(plate, numbers["delay_samples"] * model.sample_s)
 
 
 def _of_pw_r(numbers: Mapping[str, float]) -> Groups:

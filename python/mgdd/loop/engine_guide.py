@@ -64,8 +64,7 @@ class EngineGuide:
 
     def __post_init__(self) -> None:
         for name, among in (("kind", KINDS), ("shape", ("model", "parabola"))):
-            if getattr(self, name) not in among:
-                raise ParameterError.of(name, getattr(self, name), f"one of {', '.join(among)}")
+            ParameterError.unless(getattr(self, name) in among, name, getattr(self, name), f"one of {', '.join(among)}")
         if self.shape == "parabola" and self.kind != "curve":
             why = "cannot be calibrated" if self.kind == "calibrated" else "is not one timing"
             raise ParameterError(

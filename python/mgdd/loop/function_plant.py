@@ -143,10 +143,8 @@ class FunctionPlant:
         for name, given in (("inputs", inputs), ("limits", limits), ("values", values)):
             if isinstance(given, str) or len(set(given)) != len(given):
                 raise ParameterError.of(name, given, "a sequence of different names")
-        if not 0 <= seed < 2**64:
-            raise ParameterError.of("seed", seed, "in [0, 2**64)")
-        if not (math.isfinite(noise_sd) and noise_sd >= 0.0):
-            raise ParameterError.of("noise_sd", noise_sd, "finite and >= 0")
+        ParameterError.unless(0 <= seed < 2**64, "seed", seed, "in [0, 2**64)")
+        ParameterError.unless(math.isfinite(noise_sd) and noise_sd >= 0.0, "noise_sd", noise_sd, "finite and >= 0")
         if noise_sd > 0.0 and values:
             raise ParameterError("noise_sd and values were both given: noise is added to J, and there is none")
         self._function, self._values, self._user_data = function, tuple(values), user_data  # kept alive

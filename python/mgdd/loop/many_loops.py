@@ -113,7 +113,12 @@ def monte_carlo(
     """
     bench_list = [benches] if isinstance(benches, VirtualEngine | FunctionPlant) else list(benches)
     seeker_list = list(seekers) if isinstance(seekers, Sequence) else [seekers]
-    seed_list = _whole_seeds(seeds)
+    try:
+        seed_list = [operator.index(seed) for seed in seeds]
+    except TypeError as error:
+        raise ParameterError(f"seeds: must be whole numbers, for example range(20): {error}") from None
+    if wrong := [seed for seed in seed_list if not 0 <= seed < 2**64]:
+        raise ParameterError(f"seeds: {wrong[0]} must be in [0, 2**64)")
     given = [criteria or LoopCriteria()] * len(bench_list) if not isinstance(criteria, Sequence) else list(criteria)
     if len(given) != len(bench_list):
         raise ShapeError(f"criteria has {len(given)} entries: give one for all or one per bench, {len(bench_list)}")
@@ -248,13 +253,3 @@ def _bare(seeker: _Seeker) -> _Seeker:
     own = copy.deepcopy(seeker)
     own.clear_history()
     return own
-
-
-def _whole_seeds(seeds: Iterable[int]) -> list[int]:
-    try:
-        whole = [operator.index(seed) for seed in seeds]
-    except TypeError as error:
-        raise ParameterError(f"seeds: must be whole numbers, for example range(20): {error}") from None
-    if wrong := [seed for seed in whole if not 0 <= seed < 2**64]:
-        raise ParameterError(f"seeds: {wrong[0]} must be in [0, 2**64)")
-    return whole

@@ -141,8 +141,7 @@ class LoopRun(Result):
 
 def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, criteria: LoopCriteria) -> LoopRun:
     """Run the loop of `mgdd.loop.run_seeker` from Python."""
-    if cycles < 1:
-        raise ParameterError.of("cycles", cycles, ">= 1")
+    ParameterError.unless(cycles >= 1, "cycles", cycles, ">= 1")
     if not isinstance(plant, Plant):
         raise ParameterError(
             f"plant = {plant!r}: must have input_names, limit_names, apply() and measure(), as "

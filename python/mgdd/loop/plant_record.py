@@ -57,7 +57,12 @@ def cycles_to_dataset(
 ) -> Dataset:
     """Label the columns of a run, with further ones that are labelled already."""
     settings = bench.settings
-    terms = _unique([term.signal for term in settings["performance"].terms])
+    names = [term.signal for term in settings["performance"].terms]
+    total, seen = Counter(names), Counter[str]()
+    terms = []
+    for name in names:
+        seen[name] += 1
+        terms.append(name if total[name] == 1 else f"{name}_{seen[name]}")
     variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle")), **more}
     components, limits = columns.pop("components"), columns.pop("limits")
     for name, values in columns.items():
@@ -89,16 +94,6 @@ def _with_limits(
         text = "noise-free value of a limited quantity at the applied inputs"
         variables["noise_free_limits"] = (over, noise_free, own, text)
     return labelled_dataset(variables, attrs=attrs).set_coords("limit_units")
-
-
-def _unique(names: Sequence[str]) -> list[str]:
-    """Add a number to the names that occur more than once."""
-    total, seen = Counter(names), Counter[str]()
-    out = []
-    for name in names:
-        seen[name] += 1
-        out.append(name if total[name] == 1 else f"{name}_{seen[name]}")
-    return out
 
 
 _UNKNOWN = "not given by the plant"

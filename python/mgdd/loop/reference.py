@@ -66,12 +66,10 @@ class Reference:
             raise ShapeError(f"angle_deg has shape {angles.shape}: must be a column of at least one angle")
         if not np.isfinite(angles).all():
             raise DataError(f"angle_deg[{int(np.argmin(np.isfinite(angles)))}] is not finite")
-        if not 0.0 < self.sample_s <= 1.0:
-            raise ParameterError.of("sample_s", self.sample_s, "in (0, 1] s")
+        ParameterError.unless(0.0 < self.sample_s <= 1.0, "sample_s", self.sample_s, "in (0, 1] s")
         if not 0.0 <= self.from_s < len(angles) * self.sample_s:
             raise ParameterError.of("from_s", self.from_s, f"in [0, {len(angles) * self.sample_s:g}) s, inside the run")
-        if not self.band_deg > 0.0:
-            raise ParameterError.of("band_deg", self.band_deg, "> 0 deg")
+        ParameterError.unless(self.band_deg > 0.0, "band_deg", self.band_deg, "> 0 deg")
 
     @property
     def from_sample(self) -> int:

@@ -200,7 +200,16 @@ def plant_of(plant: Any, inputs: Sequence[Input], limits: Sequence[Limit], value
     """Give the plant of these inputs and limits; ParameterError where it is none, or another."""
     names, held = [one.name for one in inputs], measured_names(limits)
     if isinstance(plant, Plant):
-        _require_measured(plant, names, held)
+        if set(names) != set(plant.input_names):
+            raise ParameterError(f"inputs = {', '.join(names)}: the plant takes {', '.join(plant.input_names)}")
+        for name in held:
+            if name not in plant.limit_names:
+                have = ", ".join(plant.limit_names) or "none"
+                refused = (
+                    f"{argument('limits')}: {name!r} is not measured by the plant, which has {have}: a VirtualEngine "
+                    "measures what its own limits name, a function what it returns beside J"
+                )
+                raise ParameterError(hinted(refused, name, plant.limit_names))
         return plant
     if callable(plant):
         return FunctionPlant(plant, names, held, values=tuple(values))
@@ -267,23 +276,6 @@ def started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
                 f"{argument('start')}: {one.name} = {value:g}: must be in [{one.lower:g}, {one.upper:g}], its bounds"
             )
     return dict(zip(names, values.tolist(), strict=True))
-
-
-def _require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
-    """ParameterError where a plant has other inputs, or does not measure a limit."""
-    if set(names) != set(plant.input_names):
-        raise ParameterError(f"inputs = {', '.join(names)}: the plant takes {', '.join(plant.input_names)}")
-    for name in limits:
-        if name not in plant.limit_names:
-            have = ", ".join(plant.limit_names) or "none"
-            raise ParameterError(
-                hinted(
-                    f"{argument('limits')}: {name!r} is not measured by the plant, which has {have}: a VirtualEngine "
-                    "measures what its own limits name, a function what it returns beside J",
-                    name,
-                    plant.limit_names,
-                )
-            )
 
 
 def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tuple[Question, Choice]:

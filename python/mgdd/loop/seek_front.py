@@ -104,7 +104,13 @@ def seek_front(
     """
     given, wanted = seek_inputs(inputs), limits_of(limits)
     names, held = [one.name for one in given], [limit.name for limit in wanted]
-    signs = _signs_of(objectives)
+    form = "must name two, for example {'efficiency': 'max', 'nox_ppm': 'min'}"
+    if not isinstance(objectives, Mapping) or len(objectives) != 2:
+        raise ParameterError(f"objectives = {objectives!r}: {form}")
+    for name, way in objectives.items():
+        if way not in ("max", "min"):
+            raise ParameterError(f"objectives: {name} = {way!r}: must be 'max' or 'min'")
+    signs = {str(name): 1.0 if way == "max" else -1.0 for name, way in objectives.items()}
     terms = math.comb(len(given) + 2, 2)
     least = delay_cycles + max(4 * (len(given) + 1), terms + 3)
     for name, value, low, high in (
@@ -207,16 +213,6 @@ class _Search:
         parts = zip(shares, self._signs, row.objectives, scales, strict=True)
         j = sum(share * sign * value / scale for share, sign, value, scale in parts)
         seeker.tell(j, row.limits or None, applied=applied)
-
-
-def _signs_of(objectives: Mapping[str, str]) -> dict[str, float]:
-    form = "must name two, for example {'efficiency': 'max', 'nox_ppm': 'min'}"
-    if not isinstance(objectives, Mapping) or len(objectives) != 2:
-        raise ParameterError(f"objectives = {objectives!r}: {form}")
-    for name, way in objectives.items():
-        if way not in ("max", "min"):
-            raise ParameterError(f"objectives: {name} = {way!r}: must be 'max' or 'min'")
-    return {str(name): 1.0 if way == "max" else -1.0 for name, way in objectives.items()}
 
 
 def _row(

@@ -70,12 +70,9 @@ class LoopCriteria:
 
     def __post_init__(self) -> None:
         number = isinstance(self.optimum, int | float) and math.isfinite(self.optimum)
-        if self.optimum is not None and not number:
-            raise ParameterError.of("optimum", self.optimum, "one finite number, or None")
-        if not self.arrival > 0.0:
-            raise ParameterError.of("arrival", self.arrival, "> 0")
-        if self.tail_cycles < 1:
-            raise ParameterError.of("tail_cycles", self.tail_cycles, ">= 1")
+        ParameterError.unless(self.optimum is None or number, "optimum", self.optimum, "one finite number, or None")
+        ParameterError.unless(self.arrival > 0.0, "arrival", self.arrival, "> 0")
+        ParameterError.unless(self.tail_cycles >= 1, "tail_cycles", self.tail_cycles, ">= 1")
         if self.exceed_from is not None and self.exceed_from < 0:
             raise ParameterError.of("exceed_from", self.exceed_from, ">= 0")
         for what, values in (("exceed_above", self.exceed_above), ("limits", self._uppers())):

@@ -90,10 +90,8 @@ class SurrogatePlant:
         block_cycles: int = 100,
         outside: str = "flag",
     ) -> None:
-        if outside not in ("flag", "raise", "clamp"):
-            raise ParameterError.of("outside", outside, "'flag', 'raise' or 'clamp'")
-        if block_cycles < 1:
-            raise ParameterError.of("block_cycles", block_cycles, ">= 1")
+        ParameterError.unless(outside in ("flag", "raise", "clamp"), "outside", outside, "'flag', 'raise' or 'clamp'")
+        ParameterError.unless(block_cycles >= 1, "block_cycles", block_cycles, ">= 1")
         self.objective = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         if not self.objective:
             raise ParameterError("objective = {}: must name at least one signal")

@@ -45,8 +45,7 @@ class AngleController(Protocol):
 
 def sensors_of(noise_deg: float) -> SensorPair:
     """Give position sensors with that noise and no filter."""
-    if not 0.0 <= noise_deg <= 10.0:
-        raise ParameterError.of("noise_deg", noise_deg, "in [0, 10] deg")
+    ParameterError.unless(0.0 <= noise_deg <= 10.0, "noise_deg", noise_deg, "in [0, 10] deg")
     ideal = SensorPair()
     return SensorPair(noise_v=noise_deg * ideal.span_v / ideal.travel_deg, lag_s=0.0)
 
@@ -167,8 +166,7 @@ def track(
 def step_times_us(controller: AngleController, run: xr.Dataset) -> tuple[float, float]:
     """Replay a run through a controller of mgdd, and give median and 99.9th percentile of its step [us]."""
     inner = core_of(controller)
-    if inner is None:
-        raise ParameterError.of("controller", controller, "a controller of mgdd")
+    ParameterError.unless(inner is not None, "controller", controller, "a controller of mgdd")
     times = _core.loop.step_times_us(inner, run["reference_deg"].to_numpy(), run["sensed_angle_deg"].to_numpy())
     return float(np.median(times)), float(np.quantile(times, 0.999))
 
@@ -216,8 +214,7 @@ def _run_in_python(
     airflow: NDArray[np.float64],
     supply: NDArray[np.float64],
 ) -> dict[str, NDArray[np.float64]]:
-    if not 0 <= delay_samples <= 20:
-        raise ParameterError.of("delay_samples", delay_samples, "in [0, 20]")
+    ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
     names = ("angle_deg", "sensed_angle_deg", "speed_deg_per_s", "current_a", "duty")
     out = {name: np.empty(len(reference_deg)) for name in names}
     still = plant._still

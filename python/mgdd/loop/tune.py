@@ -43,10 +43,8 @@ def with_stiction(factors: Mapping[str, float]) -> dict[str, float]:
 
 def draw_throttles(throttle: Throttle, n: int, *, spread: float = 0.2, seed: int = 0) -> list[Throttle]:
     """Draw throttles around one: inertia, viscous friction, motor, resistance, springs, preloads and dry friction."""
-    if not 0.0 <= spread <= 0.9:
-        raise ParameterError.of("spread", spread, "in [0, 0.9]")
-    if n < 0:
-        raise ParameterError.of("n", n, ">= 0")
+    ParameterError.unless(0.0 <= spread <= 0.9, "spread", spread, "in [0, 0.9]")
+    ParameterError.unless(n >= 0, "n", n, ">= 0")
     factors = 1.0 + spread * (2.0 * np.random.default_rng(seed).random((n, len(_SPREAD_FIELDS))) - 1.0)
     return [
         throttle.replace(
@@ -162,8 +160,7 @@ def tune_controller(
     (True, 30)
     """
     family = family_of(kind)
-    if budget < 30:
-        raise ParameterError.of("budget", budget, ">= 30")
+    ParameterError.unless(budget >= 30, "budget", budget, ">= 30")
     throttle = throttle_of(throttle)
     groups = groups_of(throttle)
     setup = Setup(delay_samples=delay_samples, noise_deg=noise_deg)
@@ -192,7 +189,12 @@ def tune_controller(
 
     stop: Interrupted | None = None
     try:
-        _search(cost_of, _shares(family.space, shipped_numbers(kind, groups)), budget, seed, seen)
+        numbers = shipped_numbers(kind, groups)
+        shares = []
+        for name, (low, high, logarithmic) in family.space.items():
+            value = min(max(numbers[name], low), high)
+            shares.append(math.log(value / low) / math.log(high / low) if logarithmic else (value - low) / (high - low))
+        _search(cost_of, shares, budget, seed, seen)
     except KeyboardInterrupt:
         stop = Interrupted(f"interrupted: {len(seen)} of {budget} sets were run, the best is in .partial")
     if stop is not None and not seen:
@@ -257,12 +259,4 @@ def _numbers(space: Mapping[str, tuple[float, float, bool]], shares: Sequence[fl
     for (name, (low, high, logarithmic)), share in zip(space.items(), shares, strict=True):
         value = low * (high / low) ** share if logarithmic else low + (high - low) * share
         out[name] = float(f"{value:.4g}")
-    return out
-
-
-def _shares(space: Mapping[str, tuple[float, float, bool]], numbers: Mapping[str, float]) -> list[float]:
-    out = []
-    for name, (low, high, logarithmic) in space.items():
-        value = min(max(numbers[name], low), high)
-        out.append(math.log(value / low) / math.log(high / low) if logarithmic else (value - low) / (high - low))
     return out

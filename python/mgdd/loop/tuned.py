@@ -141,8 +141,7 @@ def _doubts(kind: str, family: Family, sample_s: float, delay_samples: int) -> t
 
 def family_of(kind: str) -> Family:
     """Look up a kind of controller."""
-    if kind not in FAMILIES:
-        raise ParameterError.of("kind", kind, f"one of {', '.join(FAMILIES)}")
+    ParameterError.unless(kind in FAMILIES, "kind", kind, f"one of {', '.join(FAMILIES)}")
     return FAMILIES[kind]
 
 

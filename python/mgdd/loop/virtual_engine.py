@@ -96,8 +96,7 @@ class VirtualEngine(_core.loop.VirtualEngine):
     ) -> None:
         if schedule is not None and point is not None:
             raise ParameterError("point and schedule were both given: name the operating points in one of them")
-        if not 0 <= seed < 2**64:
-            raise ParameterError.of("seed", seed, "in [0, 2**64)")
+        ParameterError.unless(0 <= seed < 2**64, "seed", seed, "in [0, 2**64)")
         cylinder, first = engine_of(cylinder, {} if point is None else point)
         try:
             super().__init__(
@@ -326,8 +325,7 @@ class VirtualEngine(_core.loop.VirtualEngine):
 
     def _quiet(self, cycle: int, **changes: Any) -> VirtualEngine:
         """Copy the bench without anything random or slow, at the operating point of one cycle."""
-        if cycle < 0:
-            raise ParameterError.of("cycle", cycle, ">= 0")
+        ParameterError.unless(cycle >= 0, "cycle", cycle, ">= 0")
         settings = self.settings
         cylinder = settings.pop("cylinder")
         settings.pop("schedule")

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mgdd import _core
+from mgdd._settings import remade
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets.meant import ThrottleLike, throttle_of
@@ -71,8 +72,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
     ) -> None:
         if not inputs or len(set(inputs)) < len(inputs) or not set(inputs) <= set(_INPUTS):
             raise ParameterError.of("inputs", list(inputs), f"some of {', '.join(_INPUTS)}, once each")
-        if not 0 <= seed < 2**64:
-            raise ParameterError.of("seed", seed, "in [0, 2**64)")
+        ParameterError.unless(0 <= seed < 2**64, "seed", seed, "in [0, 2**64)")
         self.throttle = Throttle() if throttle is None else throttle_of(throttle)
         self.sample_s = sample_s
         self.input_names = tuple(inputs)
@@ -96,7 +96,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         super().__init__(faults=of_sensors, plant_faults=of_others, **own)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (type(self), self._settings, self.state, self._applied)
+        return remade, (type(self), (), self._settings, {"state": self.state, "_applied": self._applied})
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.
@@ -129,12 +129,3 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
             bridge_open=applied["bridge_open"] != 0.0,
         )
         return Measurement(values={name: float(value) for name, value in reading.items()})
-
-
-def _restored(
-    kind: type[VirtualThrottle], given: dict[str, Any], state: dict[str, list[float]], applied: dict[str, float] | None
-) -> VirtualThrottle:
-    made = kind(**given)
-    made.state = state
-    made._applied = None if applied is None else dict(applied)
-    return made

@@ -178,8 +178,7 @@ class CalibrationMap(MapForms):
         """
         at = self.place(points, **coordinates)
         numbers = [name for name, entries in self._cells.items() if entries.dtype.kind == "f"]
-        if column is not None and column not in numbers:
-            raise ParameterError.of("column", column, f"one of {', '.join(numbers)}")
+        ParameterError.unless(column is None or column in numbers, "column", column, f"one of {', '.join(numbers)}")
         table = (self._values if column is None else self._cells[column]).ravel()
         parts = at.weights * table[at.cells]
         parts[at.weights == 0.0] = 0.0  # a cell without weight does not count, whatever it holds

@@ -127,8 +127,7 @@ def checked_label(name: str, given: tuple[str, str] | None) -> Label:
         raise DataError.of(
             f"unit of {name}", label.units, f"{usual.units!r}, as the name says; convert the numbers or change the name"
         )
-    if not label.long_name.strip():
-        raise DataError.of(f"long name of {name}", label.long_name, "a text that figures can print")
+    DataError.unless(label.long_name.strip(), f"long name of {name}", label.long_name, "a text that figures can print")
     return label
 
 

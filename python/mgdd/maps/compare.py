@@ -58,8 +58,7 @@ def compare_maps(
     ([0.0, 0.0, 1.0], 1)
     """
     first, second = map_of(first, "first"), map_of(second, "second")
-    if grid not in ("union", "first"):
-        raise ParameterError.of("grid", grid, "'union' or 'first'")
+    ParameterError.unless(grid in ("union", "first"), "grid", grid, "'union' or 'first'")
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
         raise ParameterError.of("tolerance", tolerance, f">= 0 {first.unit}")
     if list(first.axes) != list(second.axes):

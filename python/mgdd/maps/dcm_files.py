@@ -58,8 +58,7 @@ def write_labels(
     named = [*zip(maps if isinstance(maps, Mapping) else [table.name for table in given], given, strict=True)]
     blocks = []
     for name, (number, unit) in (values or {}).items():
-        if not np.isfinite(number):
-            raise DataError.of(f"value {name}", number, "finite")
+        DataError.unless(np.isfinite(number), f"value {name}", number, "finite")
         long_name = spoken_name(name)
         blocks.append(DcmBlock(name=name, long_name=long_name, unit=unit_to(unit), values=[[float(number)]]))
     blocks += [_block_of(name, table) for name, table in named]
@@ -180,7 +179,17 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
             skipped.append(f"{block.name}: a map is named by letters, digits, _ . % [ and ]: rename the label")
             continue
         try:
-            maps[block.name] = _map_of(block)
+            given = (("x", block.axis_x, block.x, block.unit_x), ("y", block.axis_y, block.y, block.unit_y))
+            axes: dict[str, list[float]] = {}
+            labels: dict[str, tuple[str, str]] = {}
+            for plain, label, points, unit in given if block.y else given[:1]:
+                # The names of axes stand in comments, where other tools may write anything.
+                name = label if can_be_name(label) and label not in (block.name, "x", "y", *axes) else plain
+                axes[name] = points
+                labels[name] = (unit_from(unit, name), label if label not in ("", name) else spoken_name(name))
+            labels[block.name] = (unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
+            rows = np.array(block.values)
+            maps[block.name] = CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)
         except Error as error:
             raise DataError(f"{file}, line {block.line}, {block.name}: {error}") from error
     return DcmFile(maps=maps, values=values, skipped=tuple(skipped), breakpoints=breakpoints)
@@ -206,17 +215,3 @@ def _block_of(name: str, table: CalibrationMap) -> DcmBlock:
         axis_x=x,
         axis_y=y,
     )
-
-
-def _map_of(block: DcmBlock) -> CalibrationMap:
-    given = (("x", block.axis_x, block.x, block.unit_x), ("y", block.axis_y, block.y, block.unit_y))
-    axes: dict[str, list[float]] = {}
-    labels: dict[str, tuple[str, str]] = {}
-    for plain, label, points, unit in given if block.y else given[:1]:
-        # The names of axes stand in comments, where other tools may write anything.
-        name = label if can_be_name(label) and label not in (block.name, "x", "y", *axes) else plain
-        axes[name] = points
-        labels[name] = (unit_from(unit, name), label if label not in ("", name) else spoken_name(name))
-    labels[block.name] = (unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
-    rows = np.array(block.values)
-    return CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)

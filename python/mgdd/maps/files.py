@@ -162,8 +162,7 @@ def read_map(
     soc.csv: unit of fuel_mg = 'kg': must be 'mg', as the name says; convert the numbers or change the name
     """
     file = existing_file(path)
-    if decimal not in (".", ","):
-        raise DataError.of("decimal", decimal, "'.' or ','")
+    DataError.unless(decimal in (".", ","), "decimal", decimal, "'.' or ','")
     form = _form_of(file)
     try:
         data = read_netcdf(file) if form == "nc" else None

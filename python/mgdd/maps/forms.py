@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from mgdd._settings import remade
 from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf
 from mgdd.maps.cells import NUMBERS, SOURCES, TEXTS, WITHOUT_VALUE, MapTask
@@ -163,7 +164,7 @@ class MapForms(Result):
 
     def __reduce__(self) -> tuple[Any, ...]:
         options = {"labels": self._labels, "cells": self._cells, "task": self._task, "provenance": self._provenance}
-        return _rebuild, (type(self), self._axes, self._values, {"name": self._name, **options})
+        return remade, (type(self), (self._axes, self._values), {"name": self._name, **options}, {})
 
 
 def _source_of(variable: xr.DataArray) -> str:
@@ -180,9 +181,3 @@ def _task_of(attrs: Mapping[Any, Any]) -> MapTask | None:
         return None
     limits = {name: float(value) for name, value in _under(attrs, "task_limit_").items()}
     return MapTask(objective=str(attrs["task_objective"]), limits=limits, maximize=bool(attrs.get("task_maximize", 1)))
-
-
-def _rebuild(cls: type[MapForms], axes: Any, values: Any, options: dict[str, Any]) -> MapForms:
-    make: Any = cls
-    made: MapForms = make(axes, values, **options)
-    return made

@@ -108,8 +108,7 @@ def optimize_map(
     caps = {limit.name: limit.upper - limit.margin for limit in checked}
     if objective in caps:
         raise ParameterError(f"limits: {objective} is the objective: limit other variables")
-    if infeasible not in ("raise", "keep"):
-        raise ParameterError.of("infeasible", infeasible, "'raise' or 'keep'")
+    ParameterError.unless(infeasible in ("raise", "keep"), "infeasible", infeasible, "'raise' or 'keep'")
     if max_loss is not None and not (max_loss > 0.0 and np.isfinite(max_loss)):
         raise ParameterError.of("max_loss", max_loss, f"> 0, in the unit of {objective}")
     scatter = dict(sd or {})

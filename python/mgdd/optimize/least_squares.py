@@ -165,10 +165,8 @@ class FitOptions:
     def __post_init__(self) -> None:
         for name, least in (("n_starts", 1), ("seed", 0), ("max_iterations", 1)):
             value = getattr(self, name)
-            if value is not None and not value >= least:
-                raise ParameterError.of(name, value, f">= {least}")
-        if self.tolerance is not None and not self.tolerance > 0.0:
-            raise ParameterError.of("tolerance", self.tolerance, "> 0")
+            ParameterError.unless(value is None or value >= least, name, value, f">= {least}")
+        ParameterError.unless(self.tolerance is None or self.tolerance > 0.0, "tolerance", self.tolerance, "> 0")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -144,6 +144,5 @@ def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Lim
 
 def limit_names_of(limits: Mapping[str, float] | Sequence[Limit | str]) -> list[str]:
     """Return the names of limited quantities, given as names or as limits in either form."""
-    if isinstance(limits, str):
-        raise ParameterError.of("limits", limits, "a sequence of names")
+    ParameterError.unless(not isinstance(limits, str), "limits", limits, "a sequence of names")
     return [limit.name if isinstance(limit, Limit) else limit for limit in limits]

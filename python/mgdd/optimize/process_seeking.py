@@ -103,20 +103,16 @@ def with_guides(settings: Mapping[str, Any]) -> dict[str, Any]:
         if given is None:
             continue
         if isinstance(given, Mapping) and of is not None:
-            given = _in_order(given, of, argument)
+            unknown = [name for name in given if name not in of]
+            if unknown:
+                raise ParameterError(f"{argument} names {', '.join(unknown)}: the limits are {', '.join(of) or 'none'}")
+            given = [given.get(name) for name in of]
         several = isinstance(given, list | tuple)
         out[argument] = [
             surface_of(one, names, axes, argument=f"{argument}[{k}]" if several else argument)
             for k, one in enumerate(given if several else [given])
         ]
     return out
-
-
-def _in_order(given: Mapping[str, Any], limits: Sequence[str], argument: str) -> list[Any]:
-    unknown = [name for name in given if name not in limits]
-    if unknown:
-        raise ParameterError(f"{argument} names {', '.join(unknown)}: the limits are {', '.join(limits) or 'none'}")
-    return [given.get(name) for name in limits]
 
 
 class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):

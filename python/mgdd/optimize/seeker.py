@@ -120,8 +120,7 @@ class Seeker(SeekerFindings):
         >>> round(float(history["estimate"][-1, 0]), 3)
         3.0
         """
-        if cycles < 0:
-            raise ParameterError.of("cycles", cycles, ">= 0")
+        ParameterError.unless(cycles >= 0, "cycles", cycles, ">= 0")
         try:
             for _ in range(cycles):
                 answer = fun(self.ask())

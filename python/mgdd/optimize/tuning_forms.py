@@ -86,8 +86,7 @@ def tuned(
         name: (share * length if (given := lengths[name]) is None else given) / own for name, share in shares.items()
     }
     for which, arrival, distance in zip(of, spec["arrival"] * own, spec["distance"] * own, strict=True):
-        if not arrival < distance:
-            raise ParameterError.of(f"arrival{which}", arrival, f"below distance = {distance:g}")
+        ParameterError.unless(arrival < distance, f"arrival{which}", arrival, f"below distance = {distance:g}")
     lag = _core.optimize.ComponentLag(delay_cycles=delay_cycles, lag_cycles=lag_cycles)
     whole = delay_cycles + lag_cycles
     if delay_uncertainty is None:
@@ -321,21 +320,18 @@ def per_input(name: str, value: Any, of: Sequence[str]) -> NDArray[np.float64] |
     if count > 1 and numbers.shape != (count,):
         raise ShapeError(f"{name} has shape {numbers.shape}: must be ({count},), one number per input in its unit")
     for which, number in zip(of, numbers.ravel(), strict=True):
-        if not (number > 0.0 and math.isfinite(number)):
-            raise ParameterError.of(f"{name}{which}", number, "> 0")
+        ParameterError.unless(number > 0.0 and math.isfinite(number), f"{name}{which}", number, "> 0")
     return numbers.ravel()
 
 
 def check_wish(noise_sd: float, method: str, delay_uncertainty: float | None, cycles: float | None) -> None:
     """Refuse what is not per input."""
-    if method not in _METHODS:
-        raise ParameterError.of("method", method, f"one of {', '.join(_METHODS)}")
+    ParameterError.unless(method in _METHODS, "method", method, f"one of {', '.join(_METHODS)}")
     if not (noise_sd > 0.0 and math.isfinite(noise_sd)):
         raise ParameterError.of(
             "noise_sd", noise_sd,
             "> 0; repeat one set-point some twenty times and take the standard deviation of J",
         )  # fmt: skip
-    if cycles is not None and not (cycles > 0.0 and math.isfinite(cycles)):
-        raise ParameterError.of("cycles", cycles, "> 0")
+    ParameterError.unless(cycles is None or (cycles > 0.0 and math.isfinite(cycles)), "cycles", cycles, "> 0")
     if delay_uncertainty is not None and not (delay_uncertainty >= 0.0 and math.isfinite(delay_uncertainty)):
         raise ParameterError.of("delay_uncertainty", delay_uncertainty, ">= 0 and finite; 0 for a delay known exactly")

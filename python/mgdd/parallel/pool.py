@@ -87,8 +87,7 @@ def single_threaded() -> Iterator[None]:
 
 
 def _checked(workers: int | None) -> int | None:
-    if workers is not None and not workers >= 1:
-        raise ParameterError.of("workers", workers, ">= 1")
+    ParameterError.unless(workers is None or workers >= 1, "workers", workers, ">= 1")
     return workers
 
 

@@ -57,7 +57,12 @@ def calibration_overlay(overlay: xr.Dataset | Result, *, ax: Axes | None = None)
             label = minus(f"{label_of(overlay[name]).long_name} {at:.1f}")
             lines.append(ax.axvline(at, linestyle=dash, color=color, label=label))
     ax.set_ylabel("cylinder pressure [bar]")
-    quality = _quality(overlay)
+    parts = [str(overlay.attrs["file"])] if overlay.attrs.get("file") else []
+    if "rmse_percent" in overlay:
+        parts.append(f"RMSE {float(overlay['rmse_percent']):.2f} % of p_max")
+    if "imep_closed_error_percent" in overlay:
+        parts.append(f"closed IMEP {float(overlay['imep_closed_error_percent']):+.1f} %")
+    quality = minus("\n".join(parts))
     if quality:
         ax.text(0.02, 0.95, quality, transform=ax.transAxes, va="top", fontsize="small")
     legend(ax, lines)
@@ -105,15 +110,6 @@ def tdc_scan(scan: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     ax.axvline(0.0, color=BLUE, linestyle="--", linewidth=1.0)
     ax.set_ylim(bottom=0.0)
     return finished(ax, scan, "tdc_offset_cad", "rmse_percent", [*lines, span], grid=False)
-
-
-def _quality(overlay: xr.Dataset) -> str:
-    parts = [str(overlay.attrs["file"])] if overlay.attrs.get("file") else []
-    if "rmse_percent" in overlay:
-        parts.append(f"RMSE {float(overlay['rmse_percent']):.2f} % of p_max")
-    if "imep_closed_error_percent" in overlay:
-        parts.append(f"closed IMEP {float(overlay['imep_closed_error_percent']):+.1f} %")
-    return minus("\n".join(parts))
 
 
 _NEEDED = ("free_ca50_cad", "fitted_ca50_cad", "plausible")

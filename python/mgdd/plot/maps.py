@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, COLOURS, GREY, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, COLOURS, GREY, ORANGE, axis_label, finished, legend, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -95,9 +95,7 @@ def map_contour(
     )
     if line is not None:
         lines += ax.plot(data[x], data[line], "-", color=ORANGE, linewidth=2.0, label=label_of(data[line]).long_name)
-    ax.set(xlabel=axis_label(data, x), ylabel=axis_label(data, y))
-    legend(ax, lines)
-    return ax
+    return finished(ax, data, x, y, lines, grid=False)
 
 
 def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axes | None = None) -> Axes:
@@ -196,10 +194,7 @@ def _curve(data: xr.Dataset, variable: str, ax: Axes) -> Axes:
         )
         lines.append(bars)
     lines += ax.plot(data[x], values, "o-", color=BLACK, markersize=4, label=label_of(data[variable]).long_name)
-    ax.set(xlabel=axis_label(data, x), ylabel=axis_label(data, variable))
-    ax.grid(alpha=0.3)
-    legend(ax, lines, columns=3)
-    return ax
+    return finished(ax, data, x, variable, lines, columns=3)
 
 
 def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) -> list[Artist]:

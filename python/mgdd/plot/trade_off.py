@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.plot.style import BLACK, BLUE, LINE_STYLES, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, LINE_STYLES, finished, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -67,8 +67,7 @@ def trade_off(
     >>> trade_off(sweep, "p_max_bar", "efficiency_gross").get_xlabel()
     'maximum pressure [bar]'
     """
-    if every < 1:
-        raise ParameterError.of("every", every, ">= 1")
+    ParameterError.unless(every >= 1, "every", every, ">= 1")
     sweep = require("sweep", sweep, (over, x, y), "mgdd.engine.timing_sweep")
     others = [str(dim) for dim in sweep[y].dims if dim != over]
     if over not in sweep[y].dims or len(others) > 1 or set(sweep[x].dims) != set(sweep[y].dims):
@@ -100,12 +99,9 @@ def trade_off(
             markeredgecolor=BLACK, linestyle="none", label="chosen",
         )  # fmt: skip
         lines += stars
-    ax.set(xlabel=axis_label(sweep, x), ylabel=axis_label(sweep, y))
-    ax.grid(alpha=0.3)
     ax.margins(0.08)
-    legend(ax, lines, columns=3)
     unit = label_of(sweep[over])
     ax.text(
         0.99, 0.02, f"labels: {unit.long_name} [{unit.units}]", transform=ax.transAxes, ha="right", fontsize="small"
     )
-    return ax
+    return finished(ax, sweep, x, y, lines, columns=3)

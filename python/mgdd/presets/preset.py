@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.throttle import Throttle
+from mgdd._settings import remade
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
 from mgdd.results.describe import core_rows, described
@@ -93,7 +94,8 @@ class Preset(Parameters):
         object.__setattr__(self, "sources", MappingProxyType(dict(sources)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unpickled, (self.name, self.title, dict(self.records), dict(self.sources))
+        own = {"name": self.name, "title": self.title, "sources": dict(self.sources), **self.records}
+        return remade, (Preset, (), own, {})
 
     @property
     def kind(self) -> str:
@@ -155,10 +157,6 @@ described(
     title=lambda preset: f"Preset {preset.name}, {preset.kind}: {preset.title}",
     rows=lambda preset: [row for record in preset.records.values() for row in core_rows(record)],
 )
-
-
-def _unpickled(name: str, title: str, records: Mapping[str, Any], sources: Mapping[str, str]) -> Preset:
-    return Preset(name=name, title=title, sources=sources, **records)
 
 
 def available(kind: str | None = None) -> tuple[str, ...]:
@@ -261,8 +259,7 @@ def _shipped(name: str) -> Preset | None:
 
 
 def _check_kind(kind: str | None) -> None:
-    if kind is not None and kind not in _OF_KIND:
-        raise ParameterError.of("kind", kind, f"one of {', '.join(_OF_KIND)}")
+    ParameterError.unless(kind is None or kind in _OF_KIND, "kind", kind, f"one of {', '.join(_OF_KIND)}")
 
 
 def _wrong_kind(name: str, kind: str, needed: str) -> str:

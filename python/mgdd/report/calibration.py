@@ -192,24 +192,19 @@ def summarize(
         "rows": [_trace_row(load, best) for load, best in zip(main.fit.loads, timing, strict=True)],
         "mgdd": _core.__version__,
         "law": main.name,
-        "headline": main_row(main),
+        "headline": {
+            "law": main.law,
+            "gamma_model": main.gamma_model,
+            "gamma": main.gamma,
+            "wall_heat_scale": main.wall_heat_scale,
+            "fitted": main.fitted,
+            "plausible": [not why for why in main.why_not],
+        },
         "traces": rows,
         "laws": [law_row(fit) for fit in fits],
         "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
         "unidentifiable": sorted({*main.fit.report.unidentifiable, *unknown}),
         "best_timing": [row.to_dict() for row in timing],
-    }
-
-
-def main_row(main: Member) -> dict[str, Any]:
-    """Give the headline member as plain values."""
-    return {
-        "law": main.law,
-        "gamma_model": main.gamma_model,
-        "gamma": main.gamma,
-        "wall_heat_scale": main.wall_heat_scale,
-        "fitted": main.fitted,
-        "plausible": [not why for why in main.why_not],
     }
 
 

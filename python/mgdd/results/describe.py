@@ -85,35 +85,27 @@ def picture_of(data: Any) -> str:
             continue
         places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - finite.min()) / np.ptp(finite)
         if values.ndim == 1 and values.size >= (2 if places[0].dtype.kind == "f" else 10):
-            drawing = _line_of(places[0] if places[0].dtype.kind == "f" else np.arange(values.size), shades)
+            x = places[0] if places[0].dtype.kind == "f" else np.arange(values.size)
+            at = np.unique(np.linspace(0, x.size - 1, 200).astype(int))
+            at = at[np.isfinite(shades[at])]
+            across = 240 * (x[at] - x[0]) / (x[-1] - x[0])
+            points = " ".join(f"{left:.0f},{46 - 42 * up:.1f}" for left, up in zip(across, shades[at], strict=True))
+            drawing = f"<polyline fill='none' stroke='#0072B2' points='{points}'></polyline>"
         elif values.ndim == 2 and max(values.shape) <= _CELLS:
-            drawing = _cells_of(shades)
+            width, height = 240 // len(shades), 50 // len(shades[0])
+            dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
+            drawing = ""
+            for (i, j), shade in np.ndenumerate(shades):
+                if np.isfinite(shade):
+                    color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), channel):.0f}" for channel in dark_to_pale)
+                    size = f"width='{width}' height='{height}'"
+                    drawing += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
         else:
             continue
         text = html.escape(f"{name} over {' and '.join(map(str, variable.dims))}")
         picture = f"<svg width='240' height='50' role='img'><title>{text}</title>{drawing}</svg>"
         return f"{picture}<br><small>{text}</small>"
     return ""
-
-
-def _line_of(x: Any, shades: Any) -> str:
-    at = np.unique(np.linspace(0, x.size - 1, 200).astype(int))
-    at = at[np.isfinite(shades[at])]
-    across = 240 * (x[at] - x[0]) / (x[-1] - x[0])
-    points = " ".join(f"{left:.0f},{46 - 42 * up:.1f}" for left, up in zip(across, shades[at], strict=True))
-    return f"<polyline fill='none' stroke='#0072B2' points='{points}'></polyline>"
-
-
-def _cells_of(shades: Any) -> str:
-    width, height = 240 // len(shades), 50 // len(shades[0])
-    dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
-    cells = ""
-    for (i, j), shade in np.ndenumerate(shades):
-        if np.isfinite(shade):
-            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), channel):.0f}" for channel in dark_to_pale)
-            size = f"width='{width}' height='{height}'"
-            cells += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
-    return cells
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:

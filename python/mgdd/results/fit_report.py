@@ -108,31 +108,19 @@ class FitReport(Result):
     def from_core(cls, core_report: _core.optimize.FitReport, data: ArrayLike | None = None) -> FitReport:
         """Wrap a report of the core; of the data that its residual was compared with, `nrmse_fit_percent` is made."""
         residual = _frozen(core_report.residual)
-        return cls(
-            names=tuple(core_report.names),
-            values=_frozen(core_report.values),
-            stderr=_frozen(core_report.stderr),
-            lower=_frozen(core_report.lower),
-            upper=_frozen(core_report.upper),
-            bounds_active=_frozen(np.asarray(core_report.bounds_active, dtype=np.int_)),
-            covariance=_frozen(core_report.covariance),
-            correlation=_frozen(core_report.correlation),
-            unidentifiable=tuple(core_report.unidentifiable),
-            findings=classified(core_report),
-            null_directions=_frozen(core_report.null_directions),
-            rmse=core_report.rmse,
-            cost=core_report.cost,
-            nrmse_fit_percent=None if data is None else _fit_percent(residual, data),
-            residual=residual,
-            nfev=core_report.nfev,
-            njev=core_report.njev,
-            nit=core_report.iterations,
-            history={key: _frozen(column) for key, column in core_report.history.items()},
-            status=core_report.status,
-            message=core_report.message,
-            success=core_report.success,
-            residual_blocks=core_report.residual_blocks,
-        )
+        own: dict[str, Any] = {
+            "bounds_active": _frozen(np.asarray(core_report.bounds_active, dtype=np.int_)),
+            "findings": classified(core_report),
+            "nrmse_fit_percent": None if data is None else _fit_percent(residual, data),
+            "nit": core_report.iterations,
+            "history": {key: _frozen(column) for key, column in core_report.history.items()},
+        }
+        for name in cls.__dataclass_fields__.keys() - own.keys():
+            value = getattr(core_report, name)
+            own[name] = (
+                _frozen(value) if isinstance(value, np.ndarray) else tuple(value) if isinstance(value, list) else value
+            )
+        return cls(**own)
 
     @property
     def x(self) -> NDArray[np.float64]:
@@ -175,8 +163,7 @@ class FitReport(Result):
         """
         from scipy.stats import t
 
-        if not 0.0 < level < 1.0:
-            raise ParameterError.of("level", level, "between 0 and 1")
+        ParameterError.unless(0.0 < level < 1.0, "level", level, "between 0 and 1")
         if self.residual_blocks is None:
             freedom = float(self.residual.size - np.count_nonzero(self.bounds_active == 0))
         else:

@@ -204,10 +204,8 @@ class ActuatorGuard(AroundPlant):
             if not lower <= start[name] <= upper:
                 raise ParameterError.of(f"start[{name!r}]", start[name], f"in [{lower:g}, {upper:g}]")
         for name, rate in rates.items():
-            if not rate > 0.0:
-                raise ParameterError.of(f"rates[{name!r}]", rate, "> 0")
-        if hold_cycles < 1:
-            raise ParameterError.of("hold_cycles", hold_cycles, ">= 1")
+            ParameterError.unless(rate > 0.0, f"rates[{name!r}]", rate, "> 0")
+        ParameterError.unless(hold_cycles >= 1, "hold_cycles", hold_cycles, ">= 1")
         super().__init__(plant)
         self.start = {name: float(start[name]) for name in names}
         self.bounds = {name: (float(bounds[name][0]), float(bounds[name][1])) for name in names}
@@ -264,7 +262,18 @@ class ActuatorGuard(AroundPlant):
         applied = {**self._applied, **measured.applied}
         self._cycle += 1
         self._held = max(0, self._held - 1)
-        self._judge(applied, measured)
+        over = next(
+            (limit for limit in self.limits if not measured.limits.get(limit.name, math.nan) <= limit.upper), None
+        )
+        self._recent.append({name: applied[name] for name in self.input_names})
+        self._unproved += 1
+        if over is not None:
+            cause = self._recent[max(-1 - _delay(over), -len(self._recent))]
+            self._goods[1:] = [good for good in self._goods[1:] if good != cause]
+            self._held, self._exceeded = self.hold_cycles + _delay(over), over.name
+            self._unproved = 0
+        elif self._unproved > self._delay and not measured.misfire and self._recent[0] != self._goods[-1]:
+            self._goods = [self.start, *self._goods[1:][1 - _GOOD :], self._recent[0]]
         return replace(measured, applied=applied)
 
     def _objection(self, asked: Mapping[str, float]) -> tuple[str, str]:
@@ -284,20 +293,6 @@ class ActuatorGuard(AroundPlant):
             applied[name] = min(max(asked[name], before[name] - rate), before[name] + rate)
             cut = cut or (name if applied[name] != asked[name] else "")
         return applied, cut
-
-    def _judge(self, applied: dict[str, float], measured: Measurement) -> None:
-        over = next(
-            (limit for limit in self.limits if not measured.limits.get(limit.name, math.nan) <= limit.upper), None
-        )
-        self._recent.append({name: applied[name] for name in self.input_names})
-        self._unproved += 1
-        if over is not None:
-            cause = self._recent[max(-1 - _delay(over), -len(self._recent))]
-            self._goods[1:] = [good for good in self._goods[1:] if good != cause]
-            self._held, self._exceeded = self.hold_cycles + _delay(over), over.name
-            self._unproved = 0
-        elif self._unproved > self._delay and not measured.misfire and self._recent[0] != self._goods[-1]:
-            self._goods = [self.start, *self._goods[1:][1 - _GOOD :], self._recent[0]]
 
 
 def _require_known(argument: str, given: Any, names: Sequence[str]) -> None:

@@ -231,8 +231,7 @@ class ReplayRig(OpenOnce):
     """
 
     def __init__(self, record: RigRecord, *, tolerance: float = 0.0, strict: bool = True) -> None:
-        if not tolerance >= 0.0:
-            raise ParameterError.of("tolerance", tolerance, ">= 0")
+        ParameterError.unless(tolerance >= 0.0, "tolerance", tolerance, ">= 0")
         self.record, self.tolerance, self.strict = record, tolerance, strict
         self.input_names, self.limit_names = record.input_names, record.limit_names
         self.differences: list[Difference] = []

@@ -77,14 +77,22 @@ def export_record(
     record, whole = existing_file(source), Path(target)
     chosen = whole.suffix.removeprefix(".").lower() if kind is None else kind
     kinds = (*LOG_WRITERS, "mf4", *_TABLE_WRITERS)
-    if chosen not in kinds:
-        raise ParameterError.of("kind", chosen, f"one of {', '.join(kinds)}")
+    ParameterError.unless(chosen in kinds, "kind", chosen, f"one of {', '.join(kinds)}")
     if chosen in _TABLE_WRITERS:
         if whole.exists():
             raise RigError(f"{whole} exists already: name a new folder")
         with _naming(whole), tempfile.TemporaryDirectory(dir=whole.parent) as beside:
             made = Path(beside) / whole.name
-            _write_tables(chosen, made, readable_record(record))
+            run = readable_record(record)
+            made.mkdir()
+            suffix, write = _TABLE_WRITERS[chosen]
+            taken: set[str] = set()
+            for name, data in {"frames": run.frames, "events": run.events, **run.samples}.items():
+                stem = re.sub(r"[^\w.-]", "_", name) or "table"
+                while stem in taken:
+                    stem += "_"
+                taken.add(stem)
+                write(made / f"{stem}{suffix}", data)
             made.rename(whole)
         return sorted(whole.iterdir())
     with _naming(whole):
@@ -104,18 +112,6 @@ def _naming(target: Path) -> Iterator[None]:
         if isinstance(error, Error):
             raise
         raise RigError(f"{target}: {error.strerror or error}; nothing was written, name another place") from error
-
-
-def _write_tables(kind: str, folder: Path, run: RecordedRun) -> None:
-    folder.mkdir()
-    suffix, write = _TABLE_WRITERS[kind]
-    taken: set[str] = set()
-    for name, data in {"frames": run.frames, "events": run.events, **run.samples}.items():
-        stem = re.sub(r"[^\w.-]", "_", name) or "table"
-        while stem in taken:
-            stem += "_"
-        taken.add(stem)
-        write(folder / f"{stem}{suffix}", data)
 
 
 def _columns(data: xr.Dataset) -> dict[str, tuple[Any, str, str]]:
@@ -150,15 +146,11 @@ def _write_netcdf(path: Path, data: xr.Dataset) -> None:
     write_netcdf(data.assign({str(name): v for name, v in small.items()}), path)
 
 
-def _write_parquet(path: Path, data: xr.Dataset) -> None:
-    write_parquet(_columns(data), path)
-
-
 _TABLE_WRITERS: Mapping[str, tuple[str, Callable[[Path, Any], None]]] = MappingProxyType(
     {
         "netcdf": (".nc", _write_netcdf),
         "csv": (".csv", _write_csv),
-        "parquet": (".parquet", _write_parquet),
+        "parquet": (".parquet", lambda path, data: write_parquet(_columns(data), path)),
     }
 )
 

@@ -317,7 +317,15 @@ class RealtimeLoop:
         columns = self.sample_columns()
         if self._origin_ns is None and columns["deadline_ns"].size:
             self._origin_ns = int(columns["deadline_ns"][0])
-        return _dataset(columns, self._origin_ns or 0)
+        origin_ns, values = self._origin_ns or 0, columns
+        time_s = (values.pop("deadline_ns") - origin_ns) * 1e-9
+        values["sensed_angle_deg"] = values.pop("angle_deg")
+        values["mode"] = values.pop("state")
+        values |= {name: np.array(words)[values[name]] for name, words in _CODES.items()}
+        variables: dict[str, Any] = {"time_s": ("time_s", time_s)}
+        for name, column in values.items():
+            variables[name] = ("time_s", column, *(_LABELS.get(name) or VARIABLES[name]))
+        return labelled_dataset(variables, attrs={"origin_monotonic_ns": str(origin_ns)})
 
     def sample_columns(self) -> dict[str, NDArray[Any]]:
         """Take the same samples as plain columns, for a reader that comes every few milliseconds.
@@ -343,37 +351,20 @@ class RealtimeLoop:
 
     def summary(self) -> str:
         """Say in a few lines how punctual the loop was: deadlines, times and frames."""
-        return _summary(self.report(), self.envelope.cycle_s)
-
-
-def _dataset(columns: Mapping[str, Any], origin_ns: int) -> xr.Dataset:
-    """Label the columns of the core along the time of the deadlines from an origin on the monotonic clock [ns]."""
-    values = dict(columns)
-    time_s = (values.pop("deadline_ns") - origin_ns) * 1e-9
-    values["sensed_angle_deg"] = values.pop("angle_deg")
-    values["mode"] = values.pop("state")
-    values |= {name: np.array(words)[values[name]] for name, words in _CODES.items()}
-    variables: dict[str, Any] = {"time_s": ("time_s", time_s)}
-    for name, column in values.items():
-        variables[name] = ("time_s", column, *(_LABELS.get(name) or VARIABLES[name]))
-    return labelled_dataset(variables, attrs={"origin_monotonic_ns": str(origin_ns)})
-
-
-def _summary(report: Mapping[str, Any], period_s: float) -> str:
-    """Say in a few lines how punctual the loop of a report was."""
-    frames, bus, granted = report["frames"], report["bus"], report["schedule"]
-    cycles = f"{report['cycles']} cycles of {period_s * 1e3:g} ms, {report['missed']} deadlines missed"
-    lines = [f"{cycles} ({report['late']} of them too long, longest row {report['longest_row']})"]
-    lines.append(f"{'':14}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>12}")
-    for name, what in _TIMES.items():
-        times = report[name]
-        quantiles = "".join(f"{times[q]:10.1f}" for q in ("p50", "p99", "p99_9"))
-        lines.append(f"{what + ' [us]':14}{quantiles}{times['max']:12.1f}")
-    received = f"frames: {frames['good']} good, {frames['bad']} bad, {bus['lost']} lost"
-    lines.append(
-        f"{received}, {bus['sent']} sent, {bus['full'] + bus['failed']} not sent; samples dropped:"
-        f" {report['dropped_samples']}"
-    )
-    yes = {True: "yes", False: "no"}
-    lines.append(f"SCHED_FIFO: {yes[granted['realtime']]}, memory locked: {yes[granted['memory_locked']]}")
-    return "\n".join(lines)
+        report = self.report()
+        frames, bus, granted = report["frames"], report["bus"], report["schedule"]
+        cycles = f"{report['cycles']} cycles of {self.envelope.cycle_s * 1e3:g} ms, {report['missed']} deadlines missed"
+        lines = [f"{cycles} ({report['late']} of them too long, longest row {report['longest_row']})"]
+        lines.append(f"{'':14}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>12}")
+        for name, what in _TIMES.items():
+            times = report[name]
+            quantiles = "".join(f"{times[q]:10.1f}" for q in ("p50", "p99", "p99_9"))
+            lines.append(f"{what + ' [us]':14}{quantiles}{times['max']:12.1f}")
+        received = f"frames: {frames['good']} good, {frames['bad']} bad, {bus['lost']} lost"
+        lines.append(
+            f"{received}, {bus['sent']} sent, {bus['full'] + bus['failed']} not sent; samples dropped:"
+            f" {report['dropped_samples']}"
+        )
+        yes = {True: "yes", False: "no"}
+        lines.append(f"SCHED_FIFO: {yes[granted['realtime']]}, memory locked: {yes[granted['memory_locked']]}")
+        return "\n".join(lines)

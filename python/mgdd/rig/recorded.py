@@ -109,7 +109,15 @@ def read_record(path: str | os.PathLike[str]) -> RecordedRun:
     ('degree', 0)
     """
     read = core.read_record(os.fspath(existing_file(path)))
-    header = _header(read["header"])
+    raw = read["header"]
+    text = raw["json"].decode("utf-8", "backslashreplace")
+    try:
+        content = parsed(text, "header", "JSON")
+    except DataError:
+        content = {"text": text}
+    if not isinstance(content, dict):
+        content = {"json": content}
+    header = {**content, "wall_ns": raw["wall_ns"], "monotonic_ns": raw["monotonic_ns"]}
     start = header["monotonic_ns"]
     samples: dict[str, xr.Dataset] = {}
     for table in read["tables"]:
@@ -201,18 +209,6 @@ def stamped_frames(path: Path) -> Iterator[tuple[float, core.Frame]]:
         if isinstance(record, core.Frame):
             yield (record.monotonic_ns + shift) * 1e-9, record
     _warn_of_rest(path, reader.ignored_bytes)
-
-
-def _header(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Decode the header; JSON of another program that is none is kept as text."""
-    text = raw["json"].decode("utf-8", "backslashreplace")
-    try:
-        content = parsed(text, "header", "JSON")
-    except DataError:
-        content = {"text": text}
-    if not isinstance(content, dict):
-        content = {"json": content}
-    return {**content, "wall_ns": raw["wall_ns"], "monotonic_ns": raw["monotonic_ns"]}
 
 
 def _free(name: str, taken: Mapping[str, Any]) -> str:

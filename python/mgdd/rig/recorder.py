@@ -134,8 +134,7 @@ class Recorder:
             self.close()
 
     def _new_table(self, table: str, names: Sequence[str], now: int) -> tuple[int, tuple[str, ...]]:
-        if _OWN in names:
-            raise ParameterError.of("values", _OWN, "another name: the record has its own time_s")
+        ParameterError.unless(_OWN not in names, "values", _OWN, "another name: the record has its own time_s")
         self._tables[table] = (self._writer.add_table(table, list(names), now), tuple(names))
         return self._tables[table]
 

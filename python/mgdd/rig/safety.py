@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
 from typing import Any, NamedTuple, Self
 
 from mgdd import _core
 from mgdd._core.rig import Drive
+from mgdd._settings import remade
 from mgdd.errors import DataError, ParameterError, RigError, did_you_mean
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
 from mgdd.loop import Measurement, Plant
@@ -130,7 +131,7 @@ class SafetyGate(_core.rig.SafetyGate):
         super().__init__(self._envelope)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self._envelope, self.state)
+        return remade, (SafetyGate, (self._envelope,), {}, {"state": dict(self.state)})
 
     @property
     def envelope(self) -> SafetyEnvelope:
@@ -189,12 +190,6 @@ class SafetyGate(_core.rig.SafetyGate):
 def said_of(changes: Iterable[SafetyChange]) -> list[str]:
     """Say changes of mode as events of a run."""
     return [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in changes]
-
-
-def _restored(envelope: SafetyEnvelope, state: Mapping[str, Sequence[float]]) -> SafetyGate:
-    gate = SafetyGate(envelope)
-    gate.state = dict(state)
-    return gate
 
 
 class GatedThrottle:

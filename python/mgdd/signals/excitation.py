@@ -169,8 +169,7 @@ def prbs(
     >>> signal.sizes["time_s"], sorted(set(signal["duty"].to_numpy().round(9).tolist()))
     (3100, [-0.05, 0.35])
     """
-    if register not in _TAPS:
-        raise ParameterError.of("register", register, "in [3, 16]")
+    ParameterError.unless(register in _TAPS, "register", register, "in [3, 16]")
     held = _hold(hold_s, sample_s)
     bits = maximum_length_sequence(register)
     time = _time(bits.size * held * sample_s if duration_s is None else duration_s, sample_s)
@@ -270,10 +269,8 @@ def staircase(
     """
     _check_swing(offset, amplitude)
     held = _hold(hold_s, sample_s)
-    if not (math.isfinite(rise) and rise > 0.0):
-        raise ParameterError.of("rise", rise, "> 0")
-    if cycles < 1:
-        raise ParameterError.of("cycles", cycles, ">= 1")
+    ParameterError.unless(math.isfinite(rise) and rise > 0.0, "rise", rise, "> 0")
+    ParameterError.unless(cycles >= 1, "cycles", cycles, ">= 1")
     count = max(math.ceil(2.0 * amplitude / rise * (1.0 - 1e-9)), 1)
     up = np.linspace(-1.0, 1.0, count + 1)
     levels = np.r_[up, np.tile(np.r_[up[-2::-1], up[1:]], cycles - 1), up[-2::-1]]
@@ -318,8 +315,7 @@ def maximum_length_sequence(register: int) -> NDArray[np.int_]:
 
 
 def _time(duration_s: float, sample_s: float) -> NDArray[np.float64]:
-    if not (math.isfinite(sample_s) and sample_s > 0.0):
-        raise ParameterError.of("sample_s", sample_s, "finite and > 0")
+    ParameterError.unless(math.isfinite(sample_s) and sample_s > 0.0, "sample_s", sample_s, "finite and > 0")
     if not (math.isfinite(duration_s) and duration_s >= 2.0 * sample_s):
         raise ParameterError.of("duration_s", duration_s, f"finite and at least two samples of {sample_s:g} s")
     if duration_s / sample_s > _MOST_SAMPLES:

@@ -108,8 +108,7 @@ def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> R
 
     A prediction that starts from the last noisy sample carries its noise: the residual then has -0.5 at lag 1.
     """
-    if lags < 1:
-        raise ParameterError.of("lags", lags, ">= 1")
+    ParameterError.unless(lags >= 1, "lags", lags, ">= 1")
     e, u = _pair(residual, duty)
     if e.ndim != 1 or e.size < 4 * lags:
         raise DataError(f"residual has shape {e.shape}: {4 * lags} samples in one dimension are needed for {lags} lags")

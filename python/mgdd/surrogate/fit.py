@@ -207,11 +207,9 @@ def _check_request(
     unknown = [name for name in slow if name not in outputs]
     if unknown:
         raise ParameterError(f"slow: {unknown[0]!r} is not an output: must be one of {', '.join(outputs)}")
-    if max_lag < 0:
-        raise ParameterError.of("max_lag", max_lag, ">= 0")
+    ParameterError.unless(max_lag >= 0, "max_lag", max_lag, ">= 0")
     for what, share in (("held_out", held_out), ("box", box)):
-        if not 0.0 < share < 1.0:
-            raise ParameterError.of(what, share, "in (0, 1)")
+        ParameterError.unless(0.0 < share < 1.0, what, share, "in (0, 1)")
 
 
 def _read(
@@ -252,10 +250,8 @@ _LAG, _DELAY, _TAU = 1, 3, 6.0
 
 def random_step_records(cycles: int = 4000, *, seed: int = 0, noise: float = 1.0) -> xr.Dataset:
     """Make records of a known quadratic engine whose injection is stepped at random."""
-    if cycles < 10:
-        raise ParameterError.of("cycles", cycles, ">= 10")
-    if not 0.0 <= noise < np.inf:
-        raise ParameterError.of("noise", noise, "finite and >= 0")
+    ParameterError.unless(cycles >= 10, "cycles", cycles, ">= 10")
+    ParameterError.unless(0.0 <= noise < np.inf, "noise", noise, "finite and >= 0")
     generator = np.random.default_rng(seed)
     holds = generator.integers(1, 31, size=cycles)
     which = np.repeat(np.arange(cycles), holds)[:cycles]

@@ -126,7 +126,12 @@ def fit_response(
     >>> fit.model.terms, [finding.code for finding in fit.findings]
     (('1', 'speed_rpm', 'fuel_mg', 'speed_rpm^2'), [])
     """
-    _check(kind, degree, select, n_starts, seed)
+    for what, value, choices in (("kind", kind, KINDS), ("select", select, SELECTIONS)):
+        ParameterError.unless(value in choices, what, value, f"one of {', '.join(choices)}")
+    counts = (("degree", degree, 1, _MOST_DEGREE), ("n_starts", n_starts, 1, 1000), ("seed", seed, 0, 2**32 - 1))
+    for what, count, least, most in counts:
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or not least <= count <= most:
+            raise ParameterError.of(what, count, f"a whole number in [{least}, {most}]")
     if hasattr(points, "data_vars"):
         column = response if isinstance(response, str) and response in points else ""
         factors = factors if factors is not None else input_names(points, column) or None
@@ -261,13 +266,3 @@ def _response(
     if not np.isfinite(values).all():
         raise DataError(f"{name}: point {int(np.argmin(np.isfinite(values)))} is not finite: drop or repeat it")
     return name, label, values
-
-
-def _check(kind: str, degree: int, select: str, n_starts: int, seed: int) -> None:
-    for what, value, choices in (("kind", kind, KINDS), ("select", select, SELECTIONS)):
-        if value not in choices:
-            raise ParameterError.of(what, value, f"one of {', '.join(choices)}")
-    counts = (("degree", degree, 1, _MOST_DEGREE), ("n_starts", n_starts, 1, 1000), ("seed", seed, 0, 2**32 - 1))
-    for what, count, least, most in counts:
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or not least <= count <= most:
-            raise ParameterError.of(what, count, f"a whole number in [{least}, {most}]")

@@ -129,8 +129,7 @@ class ResponseModel(Parameters):
         """
         from scipy.stats import t
 
-        if not 0.0 < level < 1.0:
-            raise ParameterError.of("level", level, "between 0 and 1")
+        ParameterError.unless(0.0 < level < 1.0, "level", level, "between 0 and 1")
         at = points_of(points, tuple(self.factors))
         mean, mean_sd = self.surface.predict(at)
         sd = np.sqrt(mean_sd**2 + self.surface.noise_sd**2)

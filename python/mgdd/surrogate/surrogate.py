@@ -57,7 +57,12 @@ def best_along(
     rules = [leverage, *(-curves[name] for name in nonnegative)]
     others = np.delete(np.arange(len(support.inputs)), column)
     inside = np.all((points[0, others] >= support.lower[others]) & (points[0, others] <= support.upper[others]))
-    candidates = _roots([*rules, *held.values(), goal.deriv()], low, high)
+    # Of a nearly straight curve the bend is left out: it would spoil the digits of the companion matrix.
+    roots = np.concatenate(
+        [curve.trim(_TINY * np.abs(curve.coef).max()).roots() for curve in [*rules, *held.values(), goal.deriv()]]
+    )
+    real = roots.real[np.abs(roots.imag) < _TINY * (high - low)]
+    candidates = np.unique(np.r_[low, high, real[(low < real) & (real < high)]])
     supported = inside & _within(rules, candidates)
     feasible = supported & _within(list(held.values()), candidates)
     if not feasible.any():
@@ -85,14 +90,6 @@ def best_along(
         bounds={"soi_cad": (float(start), float(end))},
         curvature=float(goal.deriv(2)(best)),
     )
-
-
-def _roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.float64]:
-    """Return the ends of the range and the real roots between them, sorted."""
-    # Of a nearly straight curve the bend is left out: it would spoil the digits of the companion matrix.
-    roots = np.concatenate([curve.trim(_TINY * np.abs(curve.coef).max()).roots() for curve in curves])
-    real = roots.real[np.abs(roots.imag) < _TINY * (high - low)]
-    return np.unique(np.r_[low, high, real[(low < real) & (real < high)]])
 
 
 def _within(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -168,8 +165,7 @@ class EngineSurrogate(Parameters):
         mgdd.errors.ParameterError
             An unknown input, a value that is not finite, or a point outside the support with ``outside="raise"``.
         """
-        if outside not in ("flag", "raise"):
-            raise ParameterError.of("outside", outside, "'flag' or 'raise'")
+        ParameterError.unless(outside in ("flag", "raise"), "outside", outside, "'flag' or 'raise'")
         soi = np.atleast_1d(np.asarray(soi_cad, dtype=np.float64))
         points = self.points(soi, at)
         values, supported = self.evaluate(points)

@@ -152,7 +152,11 @@ def cases_of(over: Any, *, pointwise: bool) -> Cases:
     inputs = {str(name): _values(str(name), over[name]) for name in over.keys()}  # noqa: SIM118 - a DataFrame too
     if not pointwise:
         for name, values in inputs.items():
-            _require_different(name, values)
+            entries, counts = np.unique(values, return_counts=True)
+            if (counts > 1).any():
+                raise ParameterError.of(
+                    name, float(entries[counts > 1][0]), "on the axis once; it is given several times"
+                )
         return Cases(inputs, None)
     lengths = {name: len(values) for name, values in inputs.items()}
     if len(set(lengths.values())) > 1:
@@ -173,9 +177,3 @@ def _values(name: str, given: Any) -> NDArray[np.float64]:
     if bad.size:
         raise ParameterError.of(f"{name}[{bad[0]}]", float(values[bad[0]]), "finite")
     return values
-
-
-def _require_different(name: str, values: NDArray[np.float64]) -> None:
-    entries, counts = np.unique(values, return_counts=True)
-    if (counts > 1).any():
-        raise ParameterError.of(name, float(entries[counts > 1][0]), "on the axis once; it is given several times")

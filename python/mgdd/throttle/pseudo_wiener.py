@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._settings import remade
 from mgdd.errors import DataError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 from mgdd.presets.meant import ThrottleLike, throttle_of
@@ -265,7 +266,7 @@ class PseudoWiener(SampledModel, Parameters):
         return hash((self.kind, tuple(self.parameters.values()), *self._options.values()))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (self.kind, dict(self.parameters), dict(self._options))
+        return remade, (PseudoWiener, (self.kind, dict(self.parameters)), dict(self._options), {})
 
 
 described(
@@ -273,10 +274,6 @@ described(
     title=lambda model: f"PseudoWiener {model.kind}, " + ", ".join(f"{n} {v}" for n, v in model._options.items()),
     rows=lambda model: rows_of(model.parameters, model.units),
 )
-
-
-def _rebuild(kind: str, parameters: Mapping[str, float], options: Mapping[str, str]) -> PseudoWiener:
-    return PseudoWiener(kind, parameters, switching=options["switching"], friction=options["friction"])
 
 
 def _duty(column: NDArray[np.float64]) -> NDArray[np.float64]:

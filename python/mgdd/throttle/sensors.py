@@ -76,8 +76,7 @@ class ThrottleFault:
 
     def __post_init__(self) -> None:
         of_sensor, kinds = self.kind in _OF_SENSOR, (*_OF_SENSOR, *_core.loop.throttle_fault_kinds)
-        if self.kind not in kinds:
-            raise ParameterError.of("kind", self.kind, f"one of {', '.join(kinds)}")
+        ParameterError.unless(self.kind in kinds, "kind", self.kind, f"one of {', '.join(kinds)}")
         if of_sensor and self.sensor is None:
             object.__setattr__(self, "sensor", 1)
         if self.sensor not in ((1, 2) if of_sensor else (None,)):
@@ -179,8 +178,7 @@ class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core'
         for name in ("time_s", "angle_deg"):
             if name not in run.variables:
                 raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate_throttle makes it")
-        if seed < 0:
-            raise ParameterError.of("seed", seed, ">= 0")
+        ParameterError.unless(seed >= 0, "seed", seed, ">= 0")
         time = run["time_s"].to_numpy()
         sample = even_step(time)
         raw = _core.throttle.sense(

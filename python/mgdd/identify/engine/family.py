@@ -95,11 +95,9 @@ class ModelFamily(Plausibility):
             if not getattr(self, name):
                 raise ParameterError(f"{name} is empty: a family needs at least one of each")
         for name, least in (("rmse_factor", 1.0), ("rmse_spread", 0.0)):
-            if not getattr(self, name) > least:
-                raise ParameterError.of(name, getattr(self, name), f"> {least:g}")
+            ParameterError.unless(getattr(self, name) > least, name, getattr(self, name), f"> {least:g}")
         for name in ("rmse_floor_percent", "misfit_cad"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ParameterError.of(name, getattr(self, name), ">= 0")
+            ParameterError.unless(0.0 <= getattr(self, name) < math.inf, name, getattr(self, name), ">= 0")
         if not self.wall_heat_prior[1] > 0.0:
             raise ParameterError.of("wall_heat_prior", self.wall_heat_prior, "a mean and a standard deviation > 0")
 

@@ -54,8 +54,7 @@ class Plausibility:
             if not getattr(self, name)[0] < getattr(self, name)[1]:
                 raise ParameterError.of(name, getattr(self, name), "a pair that rises")
         for name in ("efficiency_limit", "imep_percent"):
-            if not getattr(self, name) > 0.0:
-                raise ParameterError.of(name, getattr(self, name), "> 0")
+            ParameterError.unless(getattr(self, name) > 0.0, name, getattr(self, name), "> 0")
 
     def of_model(self, cylinder: Cylinder) -> Iterator[Finding]:
         """Give what is not plausible of the parameters that all traces share."""

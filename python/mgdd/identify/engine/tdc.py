@@ -184,8 +184,7 @@ def estimate_tdc(
     >>> found.low_cad < 0.0 < found.high_cad
     True
     """
-    if not 0.5 <= span_cad <= 10.0:
-        raise ParameterError.of("span_cad", span_cad, "0.5 to 10 °CA")
+    ParameterError.unless(0.5 <= span_cad <= 10.0, "span_cad", span_cad, "0.5 to 10 °CA")
     cylinder = cylinder_of(cylinder)
     request = Request.of(
         traces, cylinder.replace(burn_shape="double_wiebe"), free=None, fuel_heat_j=fuel_heat_j, bounds=bounds,

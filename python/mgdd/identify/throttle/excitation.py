@@ -137,7 +137,12 @@ def check_excitation(
     time, duty = _signal_of(excitation)
     throttle = prior_of(prior)
     window = throttle.window_deg if angle_window_deg is None else angle_window_deg
-    _check_limits(window, max_rate_deg_per_s, max_current_a)
+    low, high = window
+    if not low < high:
+        named = argument("angle_window_deg")
+        raise ParameterError(f"{named} = ({low:g}, {high:g}): the first must be below the second")
+    for name, value in (("max_rate_deg_per_s", max_rate_deg_per_s), ("max_current_a", max_current_a)):
+        ParameterError.unless(value is None or value > 0.0, name, value, "> 0")
     start = start_deg
     if start is None:
         start = 0.5 * (window[0] + window[1]) if throttle.limp_home_deg is None else throttle.limp_home_deg
@@ -171,16 +176,6 @@ def _signal_of(excitation: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     time, duty = (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))
     even_step(time)
     return time, duty
-
-
-def _check_limits(window: tuple[float, float], max_rate_deg_per_s: float | None, max_current_a: float | None) -> None:
-    low, high = window
-    if not low < high:
-        named = argument("angle_window_deg")
-        raise ParameterError(f"{named} = ({low:g}, {high:g}): the first must be below the second")
-    for name, value in (("max_rate_deg_per_s", max_rate_deg_per_s), ("max_current_a", max_current_a)):
-        if value is not None and not value > 0.0:
-            raise ParameterError.of(name, value, "> 0")
 
 
 def _violations(
@@ -290,10 +285,8 @@ def design_excitation(
     >>> check.passed, 0.1 < signal.attrs["offset"] < 0.2
     (True, True)
     """
-    if kind not in EXCITATIONS:
-        raise ParameterError.of("kind", kind, f"one of {', '.join(map(repr, EXCITATIONS))}")
-    if side not in ("above", "below", "both"):
-        raise ParameterError.of("side", side, "one of 'above', 'below', 'both'")
+    ParameterError.unless(kind in EXCITATIONS, "kind", kind, f"one of {', '.join(map(repr, EXCITATIONS))}")
+    ParameterError.unless(side in ("above", "below", "both"), "side", side, "one of 'above', 'below', 'both'")
     model = prior_of(prior)
     if model.groups is None or model.limp_home_deg is None:
         raise ParameterError("prior: has no limp-home angle and friction; pass a Throttle, for example a preset")

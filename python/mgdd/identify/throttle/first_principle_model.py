@@ -102,15 +102,13 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         given = {**REFINEMENTS, **self.parameters}
         ordered = {name: float(given[name]) for name in GROUP_NAMES}
         for name, value in ordered.items():
-            if not math.isfinite(value):
-                raise ParameterError.of(name, value, "finite")
+            ParameterError.unless(math.isfinite(value), name, value, "finite")
             positive = name in _POSITIVE
             if name != "limp_home_deg" and not (value > 0.0 if positive else value >= 0.0):
                 raise ParameterError.of(name, value, f"{('>' if positive else '>=')} 0")
         if ordered["delay_samples"] > LONGEST_DELAY:
             raise ParameterError.of("delay_samples", ordered["delay_samples"], f"<= {LONGEST_DELAY:g}")
-        if not (math.isfinite(self.sample_s) and self.sample_s > 0.0):
-            raise ParameterError.of("sample_s", self.sample_s, "> 0")
+        ParameterError.unless(math.isfinite(self.sample_s) and self.sample_s > 0.0, "sample_s", self.sample_s, "> 0")
         if not self.closed_deg < self.open_deg:
             raise ParameterError.of("open_deg", self.open_deg, f"above closed_deg = {self.closed_deg:.12g}")
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
@@ -169,8 +167,7 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             "torque_constant_nm_per_a": torque_constant_nm_per_a,
         }
         for name, value in numbers.items():
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ParameterError.of(name, value, "> 0")
+            ParameterError.unless(value is None or (math.isfinite(value) and value > 0.0), name, value, "> 0")
         if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
             raise ParameterError("inertia_kgm2, torque_constant_nm_per_a: give exactly one of them")
         p = self.parameters

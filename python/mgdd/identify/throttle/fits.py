@@ -186,8 +186,7 @@ def check_kind(kind: str, *, two_sided: bool, delay_samples: float | Sequence[fl
         raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")
     longest = _PW_DELAY if kind in PSEUDO_WIENER else LONGEST_DELAY
     for delay in () if delay_samples is None else delays_of(delay_samples):
-        if not 0.0 <= delay <= longest:
-            raise ParameterError.of("delay_samples", delay, f"within [0, {longest:g}]")
+        ParameterError.unless(0.0 <= delay <= longest, "delay_samples", delay, f"within [0, {longest:g}]")
 
 
 def delays_of(delay_samples: float | Sequence[float]) -> tuple[float, ...]:

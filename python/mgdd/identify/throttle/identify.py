@@ -175,11 +175,9 @@ def identify_throttle(
     """
     log = as_log(log)
     test = None if test is None else as_log(test, "test")
-    if model not in CHOICES:
-        raise ParameterError.of("model", model, f"one of {', '.join(map(repr, CHOICES))}")
+    ParameterError.unless(model in CHOICES, "model", model, f"one of {', '.join(map(repr, CHOICES))}")
     check_kind(model, two_sided=two_sided, delay_samples=delay_samples)
-    if not closed_deg < open_deg:
-        raise ParameterError.of("open_deg", open_deg, f"above closed_deg = {closed_deg:.12g}")
+    ParameterError.unless(closed_deg < open_deg, "open_deg", open_deg, f"above closed_deg = {closed_deg:.12g}")
     check_throttle_log(log)
     if test is not None:
         check_throttle_log(test)

@@ -82,8 +82,7 @@ def fit_pseudo_wiener(
     if base.kind != kind:
         raise ParameterError(f"start_values is a {base.kind}: must be a {kind}")
     values: dict[str, float] = {**base.at_sample(sample_s).parameters, "limp_home_deg": limp_home}
-    if lag_start not in ("best", "rest", "map"):
-        raise ParameterError.of("lag_start", lag_start, "one of best, rest, map")
+    ParameterError.unless(lag_start in ("best", "rest", "map"), "lag_start", lag_start, "one of best, rest, map")
     if lag_start != "best" and "map_start" in values:
         values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}

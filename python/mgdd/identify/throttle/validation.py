@@ -157,8 +157,7 @@ class ThrottleValidation(Result):
         from mgdd.plot.throttle import free_run
 
         parts = {"free_run": free_run, "n_step": error_growth, "residuals": residual_correlation}
-        if what not in parts:
-            raise ParameterError.of("what", what, f"one of {', '.join(parts)}")
+        ParameterError.unless(what in parts, "what", what, f"one of {', '.join(parts)}")
         return parts[what](self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:

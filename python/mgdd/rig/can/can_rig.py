@@ -74,8 +74,7 @@ def require_key(
 
 def bus_of(mode: str, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
     """Return the bus of a mode; ParameterError for an unknown one, or a bus or plant that does not go with it."""
-    if mode not in ("simulate", *BUS_MODES):
-        raise ParameterError.of("mode", mode, f"one of simulate, {', '.join(BUS_MODES)}")
+    ParameterError.unless(mode in ("simulate", *BUS_MODES), "mode", mode, f"one of simulate, {', '.join(BUS_MODES)}")
     if mode == "simulate":
         if bus is not None:
             bound = "given for a bus: 'hil', 'dry_run' or 'bench'; 'simulate' takes a plant instead"
@@ -155,8 +154,7 @@ class CanRig:
         self.bus = bus_of(self.mode, self.map, bus, plant)
         trigger = self.map.measurements[self.map.trigger]
         self.timeout_s = trigger.timeout_s or 0.0 if timeout_s is None else float(timeout_s)
-        if not 0.0 < self.timeout_s < math.inf:
-            raise ParameterError.of("timeout_s", timeout_s, "> 0 s")
+        ParameterError.unless(0.0 < self.timeout_s < math.inf, "timeout_s", timeout_s, "> 0 s")
         self._arm, self._key_file = arm, key_file
         self._on_frame = on_frame
         self._signals = SignalsAsExceptions()

@@ -102,8 +102,7 @@ class Hub:
         faults: Sequence[BusFault] = (),
         seed: int = 0,
     ) -> None:
-        if not 0 <= port < 65536:
-            raise ParameterError.of("port", port, "in [0, 65535]")
+        ParameterError.unless(0 <= port < 65536, "port", port, "in [0, 65535]")
         self.host, self.port = host, port
         self.frames = self.malformed = 0
         self._injector = FaultInjector(faults, seed)

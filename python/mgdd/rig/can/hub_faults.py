@@ -52,12 +52,9 @@ class BusFault:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
-        if self.kind not in KINDS:
-            raise ParameterError.of("fault", self.kind, f"one of {', '.join(KINDS)}")
-        if not 0.0 <= self.p <= 1.0:
-            raise ParameterError.of("p", self.p, "in [0, 1]")
-        if not 0.0 <= self.ms <= 60_000.0:
-            raise ParameterError.of("ms", self.ms, "in [0, 60000] ms")
+        ParameterError.unless(self.kind in KINDS, "fault", self.kind, f"one of {', '.join(KINDS)}")
+        ParameterError.unless(0.0 <= self.p <= 1.0, "p", self.p, "in [0, 1]")
+        ParameterError.unless(0.0 <= self.ms <= 60_000.0, "ms", self.ms, "in [0, 60000] ms")
 
     @classmethod
     def parse(cls, text: str) -> Self:

@@ -170,21 +170,18 @@ class MapReader:
         scale, offset = table.take("scale", "number", 1.0), table.take("offset", "number", 0.0)
         if scale == 0.0 or not math.isfinite(scale):
             raise table.error("scale", scale, "finite and not 0")
-        self._require_unit(name, signal, table, plain=scale == 1.0 and offset == 0.0)
-        lower = table.take("lower", "number") if bounded else -math.inf
-        upper = table.take("upper", "number") if bounded else math.inf
-        return MappedSignal(name=name, signal=signal, scale=scale, offset=offset, lower=lower, upper=upper)
-
-    def _require_unit(self, name: str, signal: DbcSignal, table: TomlTable, *, plain: bool) -> None:
         unit = table.take("unit", "text")
         if _plain_unit(unit) != _plain_unit(signal.unit):
             raise table.error("unit", unit, f"{signal.unit!r}, the unit of {signal.name} in {self.dbc.file.name}")
         own = named_label(name).units
         known = name in VARIABLES or own != "-"
-        if plain and known and _plain_unit(own) != _plain_unit(unit):
+        if (scale == 1.0 and offset == 0.0) and known and _plain_unit(own) != _plain_unit(unit):
             raise table.error(
                 "unit", unit, f"{own!r} as the name {name} says, or converted: give scale (and offset) to that unit"
             )
+        lower = table.take("lower", "number") if bounded else -math.inf
+        upper = table.take("upper", "number") if bounded else math.inf
+        return MappedSignal(name=name, signal=signal, scale=scale, offset=offset, lower=lower, upper=upper)
 
     def _raws(self, message: DbcMessage, table: TomlTable) -> dict[str, Raw]:
         out: dict[str, Raw] = {}

@@ -157,7 +157,15 @@ def run_node(
     """
     try:
         if step:
-            _run_steps(core, bus, log, keep_on)
+            while keep_on():
+                frame = bus.receive(_STEP_POLL_S)
+                if frame is None or not core.take(frame):
+                    continue
+                was_driven = core.driven
+                for answer in core.answer():
+                    bus.send(answer)
+                if log is not None and (core.driven or was_driven):  # also why the drive was taken away
+                    log.write(core, frame.monotonic_ns)
         else:
             _run_clock(core, bus, period_s, log, keep_on)
     finally:
@@ -181,8 +189,7 @@ def _run_clock(
     core: NodeCore, bus: Bus, period_s: float | None, log: TruthLog | None, keep_on: Callable[[], bool]
 ) -> None:
     period_ns = round((core.map.cycle_s if period_s is None else period_s) * 1e9)
-    if period_ns < 100_000:
-        raise ParameterError.of("period_s", period_s, ">= 1e-4 s")
+    ParameterError.unless(period_ns >= 100000, "period_s", period_s, ">= 1e-4 s")
     next_ns = time.monotonic_ns() + period_ns
     known_ns = 0  # until when the node is known to have stood still
     while keep_on():
@@ -206,18 +213,6 @@ def _run_clock(
                 break
         for frame in frames:
             bus.send(frame)
-
-
-def _run_steps(core: NodeCore, bus: Bus, log: TruthLog | None, keep_on: Callable[[], bool]) -> None:
-    while keep_on():
-        frame = bus.receive(_STEP_POLL_S)
-        if frame is None or not core.take(frame):
-            continue
-        was_driven = core.driven
-        for answer in core.answer():
-            bus.send(answer)
-        if log is not None and (core.driven or was_driven):  # also why the drive was taken away
-            log.write(core, frame.monotonic_ns)
 
 
 def parent_watch() -> Callable[[], bool]:

@@ -92,7 +92,21 @@ def connected(interface: str, channel: str | int, options: Mapping[str, Any], na
     if interface == "socketcand":
         options.setdefault("tcp_tune", True)
         logging.getLogger("can.interfaces.socketcand.socketcand").setLevel(logging.CRITICAL)  # one per TCP segment
-        _require_hub(name, options)
+        missing = [key for key in ("host", "port") if key not in options]
+        if missing:
+            raise RigError(
+                f"{name}: socketcand needs {' and '.join(missing)}, for example socketcand:can0?host=H&port=29536"
+            )
+        port = options["port"]
+        if not (str(port).isdigit() and 0 < int(port) < 65536):
+            raise RigError.of(f"{name}: port", port, "a whole number in [1, 65535], as the hub prints it")
+        try:
+            with socket.create_connection((options["host"], options["port"]), timeout=_GREETING_S) as stream:
+                greeting = stream.recv(16)
+        except OSError as error:
+            raise RigError(f"{name}: no answer there: {error}; start the hub first: mgdd rig hub") from error
+        if not greeting.startswith(b"< hi"):
+            raise RigError(f"{name}: what answers there is not socketcand: it sent {greeting!r}")
     if interface not in can.VALID_INTERFACES:
         guess = did_you_mean(interface, can.VALID_INTERFACES)
         names = f"must be one of {', '.join(sorted(can.VALID_INTERFACES))}"
@@ -117,25 +131,6 @@ def error_code(error: Exception) -> int:
     """Return the errno of an error of python-can or of the system; 0 where it has none."""
     code = getattr(error, "error_code", None) or getattr(error, "errno", None)
     return code if isinstance(code, int) else 0
-
-
-def _require_hub(name: str, options: Mapping[str, Any]) -> None:
-    """Refuse a place where no socketcand answers: python-can would try for ten seconds, or wait for ever."""
-    missing = [key for key in ("host", "port") if key not in options]
-    if missing:
-        raise RigError(
-            f"{name}: socketcand needs {' and '.join(missing)}, for example socketcand:can0?host=H&port=29536"
-        )
-    port = options["port"]
-    if not (str(port).isdigit() and 0 < int(port) < 65536):
-        raise RigError.of(f"{name}: port", port, "a whole number in [1, 65535], as the hub prints it")
-    try:
-        with socket.create_connection((options["host"], options["port"]), timeout=_GREETING_S) as stream:
-            greeting = stream.recv(16)
-    except OSError as error:
-        raise RigError(f"{name}: no answer there: {error}; start the hub first: mgdd rig hub") from error
-    if not greeting.startswith(b"< hi"):
-        raise RigError(f"{name}: what answers there is not socketcand: it sent {greeting!r}")
 
 
 class Reception:

@@ -136,8 +136,7 @@ class SignalMap:
                     guess = did_you_mean(name, value_names)
                     raise ParameterError.of(what, name, f"a measured value{'; ' + guess if guess else ''}")
         for name, weight in weights.items():
-            if not math.isfinite(weight):
-                raise ParameterError.of(f"objective of {name}", weight, "finite")
+            ParameterError.unless(math.isfinite(weight), f"objective of {name}", weight, "finite")
         return replace(self, limits=chosen_limits, objective=weights)
 
     @property

@@ -85,8 +85,7 @@ class CanTransport:
             raise ParameterError.of("interface", interface, "the name of an interface of python-can, such as socketcan")
         if channel is None or channel == "":
             raise ParameterError.of("channel", channel, "given: a bus is never chosen by a configuration file")
-        if not 0.0 < send_timeout_s < 10.0:
-            raise ParameterError.of("send_timeout_s", send_timeout_s, "in (0, 10) s")
+        ParameterError.unless(0.0 < send_timeout_s < 10.0, "send_timeout_s", send_timeout_s, "in (0, 10) s")
         self.interface, self.channel = interface, channel
         self.options = dict(options)
         self.send_timeout_s = send_timeout_s

@@ -97,7 +97,18 @@ class LoopSamples:
             _keep(self._recorded, now)
         if before is None:
             return
-        exchange = Exchange({"duty": before["duty"]}, self._measurement(before, now))
+        values = {name: now[name] for name in _MAP_NAMES.values()}
+        duty = now["applied_duty"]
+        exchange = Exchange(
+            {"duty": before["duty"]},
+            Measurement(
+                components=(),
+                limits={},
+                misfire=False,
+                values={**self._missing, **{n: v for n, v in values.items() if n in self._missing}},
+                applied={"duty": before["duty"] if math.isnan(duty) else duty},
+            ),
+        )
         self._row(flat(exchange))
         if began and not over:
             asked, thinking_s = {"duty": before["asked_duty"]}, before["compute_us"] * 1e-6
@@ -106,16 +117,6 @@ class LoopSamples:
                 self._reported + len(self._unreported), asked, exchange.measurement, thinking_s, period_s - thinking_s
             )
             self._unreported.append(cycle)
-
-    def _measurement(self, before: Mapping[str, float], now: Mapping[str, float]) -> Measurement:
-        values = {name: now[name] for name in _MAP_NAMES.values()}
-        return Measurement(
-            components=(),
-            limits={},
-            misfire=False,
-            values={**self._missing, **{n: v for n, v in values.items() if n in self._missing}},
-            applied={"duty": _applied(before, now)},
-        )
 
 
 def _columns() -> dict[str, array[float]]:
@@ -146,11 +147,6 @@ def task_columns(kept: Mapping[str, Sequence[float]], samples: int) -> dict[str,
         "duty": np.where(np.isnan(applied), columns["duty"][at], applied),
         "sensed_angle_deg": columns["sensed_angle_deg"][after],
     }
-
-
-def _applied(before: Mapping[str, float], after: Mapping[str, float]) -> float:
-    duty = after["applied_duty"]
-    return before["duty"] if math.isnan(duty) else duty
 
 
 def loop_rows(recorded: RecordedRun) -> list[dict[str, float]]:

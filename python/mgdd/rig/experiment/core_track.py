@@ -262,7 +262,13 @@ class _CoreRun:
             time.sleep(-behind_s % self._sample_s)
             try:
                 with self.loop:
-                    self._bring_into_service()
+                    try:
+                        self.loop.arm(self._patience_s)
+                        self._feed()
+                        self.loop.drive(self._patience_s)
+                    except RigError as error:
+                        self._take()
+                        raise self.bus.error or error from None
                     try:
                         self._follow()
                     except KeyboardInterrupt:
@@ -281,15 +287,6 @@ class _CoreRun:
             if frame is not None and (frame.id, frame.extended) == self._trigger:
                 return frame.monotonic_ns
         return time.monotonic_ns()
-
-    def _bring_into_service(self) -> None:
-        try:
-            self.loop.arm(self._patience_s)
-            self._feed()
-            self.loop.drive(self._patience_s)
-        except RigError as error:
-            self._take()
-            raise self.bus.error or error from None
 
     def _follow(self) -> None:
         while self.samples.done < len(self._references_deg):

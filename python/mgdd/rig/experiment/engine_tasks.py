@@ -98,7 +98,7 @@ class SeekPlan:
             figures=result.to_dict() | {"guide": self.task.guide},
             dataset=result.run.dataset,
             interrupted=result.interrupted,
-            drawings={"seek": partial(_draw, result.run.dataset)},
+            drawings={"seek": partial(_drawn, "seeking", result.run.dataset, (8.0, 7.0))},
         )
 
 
@@ -159,7 +159,7 @@ class MapPlan:
             dataset=found.dataset,
             interrupted=interrupted,
             files={f"{name}.nc": table for name, table in maps.items()},
-            drawings={name: partial(_draw_map, table) for name, table in maps.items()},
+            drawings={name: partial(_drawn, "map_cells", table, (6.6, 4.6)) for name, table in maps.items()},
         )
 
 
@@ -205,13 +205,7 @@ def _keys(table: str, task: SeekTask | MapTask) -> Iterator[None]:
         raise error.reworded(f"{table}.{error}") from error
 
 
-def _draw(cycles: xr.Dataset) -> Figure:
+def _drawn(figure: str, data: xr.Dataset, size: tuple[float, float]) -> Figure:
     from mgdd import plot
 
-    return drawn(plot.seeking, cycles, size=(8.0, 7.0))
-
-
-def _draw_map(table: xr.Dataset) -> Figure:
-    from mgdd import plot
-
-    return drawn(plot.map_cells, table, size=(6.6, 4.6))
+    return drawn(getattr(plot, figure), data, size=size)

@@ -163,8 +163,7 @@ class Experiment:
             Of the bus; as it is if left out.
         """
         for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
-            if value not in among:
-                raise ParameterError.of(name, value, f"one of {', '.join(among)}")
+            ParameterError.unless(value in among, name, value, f"one of {', '.join(among)}")
         bus = replace(self.bus, connection=connection or self.bus.connection, pace=pace or self.bus.pace)
         replay = self.replay if record is None else ReplaySettings(record=os.fspath(record))
         return replace(self, mode=mode, replay=replay, bus=bus)

@@ -101,8 +101,7 @@ def run_self_test(*, loop: str = "python", progress: Callable[[str], None] | Non
     ``"core"`` an experiment on the real-time loop of the core, whose controllers give no ``nan``. `progress` is called
     with each way.
     """
-    if loop not in WAYS_OF:
-        raise ParameterError.of("loop", loop, f"one of {', '.join(WAYS_OF)}")
+    ParameterError.unless(loop in WAYS_OF, "loop", loop, f"one of {', '.join(WAYS_OF)}")
     ways = WAYS_OF[loop]
     experiment = Experiment.from_toml(_EXPERIMENT)
     checked, home_deg = check_experiment(experiment), throttle_named(experiment.plant.preset, Path()).limp_home_deg

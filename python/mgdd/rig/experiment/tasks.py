@@ -75,7 +75,10 @@ class TrackPlan:
                 f"{sample_s:g} s, as that of the plant",
             )  # fmt: skip
         self.samples = len(self.reference.angle_deg)
-        self.model = _model_named(task.model, folder)
+        fitted, model = task.model.endswith(".toml"), task.model
+        self.model: Any = (
+            identify.load_throttle_model(beside(folder, model)) if fitted else throttle_named(model, folder)
+        )
         require_known_delay(task.controller, sample_s, task.delay_samples or 0)
         _, self.doubts = self._made()
 
@@ -178,12 +181,6 @@ class IdentifyPlan:
 def fewer(samples: int, most: int | None) -> int:
     """Give the samples of a task, at most so many."""
     return samples if most is None else min(samples, most)
-
-
-def _model_named(name: str, folder: Path) -> Any:
-    if name.endswith(".toml"):
-        return identify.load_throttle_model(beside(folder, name))
-    return throttle_named(name, folder)
 
 
 def _drive(

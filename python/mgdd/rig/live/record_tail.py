@@ -55,7 +55,8 @@ class RecordTail:
                     self._forget()
                     news = news._replace(restarted=True)
                 if self._file is None:
-                    self._begin(file.read(16))
+                    self.start_ns = int(core.RecordReader(str(self.path)).header["monotonic_ns"])
+                    self._at = 52 + int.from_bytes(file.read(16)[12:16], "little")
                     self._file = same
                 file.seek(self._at)
                 data = file.read(_AT_ONCE)
@@ -67,10 +68,6 @@ class RecordTail:
             self.trouble = f"{self.path}: {error.strerror or error}"
             return news
         return news._replace(rows=self._read(data, news))
-
-    def _begin(self, head: bytes) -> None:
-        self.start_ns = int(core.RecordReader(str(self.path)).header["monotonic_ns"])
-        self._at = 52 + int.from_bytes(head[12:16], "little")
 
     def _read(self, data: bytes, news: News) -> dict[str, tuple[list[str], NDArray[np.int64], NDArray[np.float64]]]:
         at, view, raw = 0, memoryview(data), dict[tuple[int, int], tuple[list[int], list[memoryview]]]()
