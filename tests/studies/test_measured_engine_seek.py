@@ -16,6 +16,7 @@ from mgdd.surrogate.fit import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd_studies import measured_engine_cases, measured_engine_seek, run_study
 from mgdd_studies.base import StudyResult
+from mgdd_studies.measured_engine_map import MapJudge, guide_of, held_steps, sought
 from mgdd_studies.measured_engine_seek import run_measured_engine_seek
 
 needs_records = pytest.mark.skipif("h2df_502" not in datasets.names(), reason="MGDD_DATA_DIR holds no folder h2df_502")
@@ -137,3 +138,22 @@ def test_on_the_measured_engine() -> None:
     assert known["outside_share"] < 0.02
     assert ignored["error_cad"] < -6.0
     assert ignored["mean_nox_ppm"] > known["mean_nox_ppm"] + 300.0
+
+
+@needs_records
+def test_a_map_over_the_load_steps_of_the_measured_engine() -> None:
+    records = datasets.read("h2df_502")
+    surrogate = fit_surrogate(records)
+    judge = MapJudge(surrogate)
+    assert judge.best_cad.round(1).tolist() == [-3.7, -0.9, 2.3, -1.5, 1.3, 4.2, 0.3, 2.8, 5.5, 1.4, 3.6, 6.0]
+    assert held_steps(records)["nox_ppm"].size == 600
+    mean, worst, above = judge(np.full(12, judge.best_cad.max()))  # one safe timing for all loads
+    assert (round(mean, 2), round(worst, 2), above.any()) == (0.21, 0.32, False)
+    lost = {}
+    for name, alone, margin in (("25 held steps", 11, 110.0), ("1500 cycles", 10, 70.0)):
+        guide = guide_of(records, name)
+        assert [judge.of_guide(guide, ppm)[2].sum() for ppm in (0.0, margin)] == [alone, 0]
+        (found,) = sought(surrogate, guide, seed=0, stops=(16,), block_cycles=1)
+        lost[name] = judge.of_search(found)[0]
+    (found,) = sought(surrogate, {}, seed=0, stops=(16,), block_cycles=1)
+    assert lost["1500 cycles"] < 0.03 < lost["25 held steps"] < judge.of_search(found)[0]
