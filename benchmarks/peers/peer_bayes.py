@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import warnings
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
@@ -179,10 +180,15 @@ def skopt_by_hand(
     goes_on: bool = False,
     acquisition: str = "EI",
     spread_first: int = SPREAD_FIRST,
+    scale: tuple[float, float] | None = None,
     **acquisition_settings: float,
 ) -> Contender:
-    """Search an acquisition once, from 300 random points, not five times from 10 000; the package scales inputs."""
+    """Search an acquisition once, from 300 random points, not five times from 10 000; the package scales inputs.
+
+    Length scales are those of the package, or bounded, as shares of the bounds of an input.
+    """
     from skopt import Optimizer
+    from skopt.learning.gaussian_process.kernels import ConstantKernel, Matern
 
     bounds = edges(lower, upper)
     points = mesh(bounds)
@@ -199,6 +205,10 @@ def skopt_by_hand(
         )
         gp = search.base_estimator_
         gp.set_params(n_restarts_optimizer=0)
+        if scale is not None:
+            lengths = np.full(len(bounds), math.sqrt(scale[0] * scale[1]))
+            amplitude = ConstantKernel(1.0, (0.01, 1000.0))  # as the package has it
+            gp.set_params(kernel=amplitude * Matern(nu=2.5, length_scale=lengths, length_scale_bounds=scale))
         spread = spread_points(np.random.RandomState(seed), bounds, spread_first)
         readings: list[float] = []
         x = np.atleast_1d(start)
