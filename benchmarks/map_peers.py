@@ -195,7 +195,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--visits", default="2,4,8", help="in each cell")
-    parser.add_argument("--cycles", type=int, default=60, help="in each cell, each told; 0: leave them out")
+    parser.add_argument("--cycles", type=int, default=0, help="in each cell, each told; 0: left out, they take minutes")
     parser.add_argument("--only", default="", help="regular expression for names of rows")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 _LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length
 # Letters that are more than a coincidence, and names that are an answer rather than a list.
 _SHORTEST_STEM, _MOST_NAMES = 3, 4
+_LEAST_ALIKE = 0.7  # a slip of the fingers; at 0.6 --dcm leads to --decimal
 # Words of the field, and of other libraries, by what stands for them here.
 _MEANS = {
     word: meant.split()
@@ -69,7 +70,8 @@ def near_names(name: str, known: Iterable[str]) -> list[str]:
         if len(close) > _MOST_NAMES:  # of many, those that say no more
             close = [other for other in close if len(_words(other)) == min(map(len, map(_words, close)))]
     if not 0 < len(close) <= _MOST_NAMES:
-        close = difflib.get_close_matches(name, near, 1)
+        bare = {other.lstrip("-"): other for other in near}  # two dashes alike are no letters alike
+        close = [bare[one] for one in difflib.get_close_matches(name.lstrip("-"), bare, 1, _LEAST_ALIKE)]
     return close
 
 

@@ -158,14 +158,15 @@ COMMANDS = {
 }
 # Other words for a command.
 _ALSO = {
-    "engine simulate": "run cycle", "engine analyze": "analyse analysis", "engine check": "trust",
+    "engine simulate": "run cycle", "engine analyze": "analyse analysis plot report heat-release tdc indicate", "engine check": "trust",
     "engine calibrate": "fit calibration", "engine optimum": "optimise optimize best", "engine seek": "search",
     "engine sweep": "grid", "map optimize": "optimise optimum build make", "map export": "convert write",
     "map fit": "build make", "map seek": "search", "map trade-off": "pareto", "map show": "plot", "map diff": "compare",
     "map design": "doe",
-    "throttle track": "control run", "throttle excite": "signal", "data info": "read", "data get": "download",
+    "throttle identify": "fit", "throttle track": "control run step", "throttle excite": "signal",
+    "rig record": "monitor log", "data info": "read", "data get": "download",
     "data list": "datasets --list-datasets",
-    "preset list": "presets --list-presets", "study": "studies", "rig selftest": "self-test test", "doctor": "info",
+    "preset list": "presets --list-presets", "study": "studies", "rig selftest": "self-test test", "doctor": "info version",
 }
 # Options of other programs, and what they are here.
 _OPTIONS = {
@@ -173,7 +174,9 @@ _OPTIONS = {
     "--x0": "--start", "--iterations": "--cycles", "--options": "--seeker-set", "--constraint": "--limit",
     "--engine": "--preset", "--format": "--output", "--plot": "--figure", "--silent": "--quiet",
     "--rpm": "--speed-rpm", "--unit": "--pressure-unit", "--grid": "--over", "--param": "--set", "--dir": "--folder",
-    "--points": "--visits", "--cycles": "--visits",
+    "--points": "--visits", "--cycles": "--visits", "--step": "--reference step:FROM:TO", "--dcm": "--output FILE.dcm",
+    "--bore": "--set bore_mm=X", "--stroke": "--set stroke_mm=X", "--cr": "--set compression_ratio=X",
+    "--rod": "--set connecting_rod_mm=X", "--max-pressure": "--limit p_max_bar=X",
 }
 # fmt: on
 _EPILOG = """exit codes: 0 done, 1 a self-test or replay that failed, 2 bad input or usage, 3 no convergence or no
@@ -202,6 +205,7 @@ class Parser(argparse.ArgumentParser):
 
     later: Callable[[Parser], None] | None = None
     example = ""
+    words: Sequence[str] = ()
 
     def filled(self) -> Parser:
         """Give the parser with all its options or commands."""
@@ -213,9 +217,16 @@ class Parser(argparse.ArgumentParser):
                 self.error(str(error))
         return self
 
+    def _ranges(self, option: str) -> bool:
+        """Whether a range of numbers, of which the first is below zero, stands behind an option."""
+        begun = [k for k, word in enumerate(self.words) if word.startswith("--") and option.startswith(word[2:])]
+        behind = "".join(self.words[k + 1] for k in begun[:1] if k + 1 < len(self.words))
+        return "--over" in self.format_usage() and re.fullmatch(r"-[\d.]+[:,][\d.:,-]+", behind) is not None
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse with all options."""
         self.filled()
+        self.words = list(args or ())
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
@@ -224,13 +235,14 @@ class Parser(argparse.ArgumentParser):
             message = hinted(message, found[1], [choice.strip("' ") for choice in found[2].split(",")])
         elif message.endswith("required") or "required: " in message:
             message += f", as in {self.example}"
+        elif (found := re.search(r"--(\S+): expected one argument$", message)) and self._ranges(found[1]):
+            message += _over(found[1])
         elif found := re.search(r"argument (\S+): expected one argument$", message):
             action = next(own for own in self._actions if "/".join(own.option_strings) == found[1])
             form = f", {action.metavar}; below zero it is {action.option_strings[-1]}=-…" if action.type else ""
             message += f", one of {', '.join(action.choices)}" if action.choices else form
-        elif found := re.search(r"argument --(\S+): invalid .*'.+:.+'$", message):
-            over = f"; a range is --over {found[1].replace('-', '_')}=LOW:HIGH:COUNT"
-            message += over if "--over" in self.format_usage() else ""
+        elif found := re.search(r"argument --(\S+): invalid .*'.+[:,].+'$", message):
+            message += _over(found[1]) if "--over" in self.format_usage() else ""
         raise UsageError(message, self)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -243,9 +255,17 @@ class Parser(argparse.ArgumentParser):
                 own.error("--interactive: pages of --report show the values under the pointer: leave it out")
             strange = _OPTIONS.get(strange, strange)
             known = ["--output", *re.findall(r"--[a-z-]+", own.format_usage())]
-            message = hinted(f"unrecognized arguments: {' '.join(extra)}", strange, known)
+            message = f"unrecognized arguments: {' '.join(extra)}"
+            if " " in strange and strange.partition(" ")[0] in known:
+                message += f"; did you mean {strange!r}?"
+            else:
+                message = hinted(message, strange, known)
             own.error(message if "did you mean" in message else f"{message}, as in {own.example}")
         return found
+
+
+def _over(option: str) -> str:
+    return f"; a range is --over {option.replace('-', '_')}=LOW:HIGH:COUNT"
 
 
 def root_parser() -> Parser:
@@ -310,6 +330,8 @@ def understood(words: Sequence[str], parser: Parser) -> list[str]:
     if len(named) == 2 and named[0] not in COMMANDS and named[1] in COMMANDS:
         named.reverse()
     group = named[0] if named and named[0] in COMMANDS else ""
+    if len(named) == 1 and group and not COMMANDS[group].module and rest and not {"-h", "--help"} & {*rest}:
+        parser.error(f"{group}: which command? {group} has {_below(group)}")
     at = 1 if group else 0
     if len(named) == at or (group and COMMANDS[group].module):
         return [*named, *rest, *front]
@@ -317,9 +339,15 @@ def understood(words: Sequence[str], parser: Parser) -> list[str]:
     others = [] if found else _meant("", named[at])  # of another group
     if len(found) > 1 or others:
         ways = " or ".join(f"mgdd {name}" for name in found or others)
-        parser.error(f"{' '.join(named[: at + 1])}: write {ways}")
+        own = f"{group} has {_below(group)}; elsewhere there is" if others and group else "write"
+        parser.error(f"{' '.join(named[: at + 1])}: {own} {ways}")
     named[: at + 1] = found[0].split() if found else named[: at + 1]
     return [*named, *rest, *front]
+
+
+def _below(group: str) -> str:
+    """List the commands of a group."""
+    return ", ".join(name.rpartition(" ")[2] for name in COMMANDS if name.startswith(f"{group} "))
 
 
 def _meant(group: str, word: str) -> list[str]:

@@ -61,7 +61,21 @@ engine tune -> mgdd throttle tune
 map build -> mgdd map fit or mgdd map optimize
 throttle track --preset P2 = throttle track
 engine seek --guide -> one of none, curve, calibrated
-engine sweep --soc -20:5:1 -> below zero it is --soc-cad=-
+engine sweep --soc -20:5:1 -> --over soc_cad=LOW:HIGH:COUNT
+engine simulate --soc -20:5:1 -> below zero it is --soc-cad=-
+map seek --speed 1000,1500,2000 -> --over speed_rpm=LOW:HIGH:COUNT
+map --speed 1000,1500 -> map: which command? map has design, fit,
+version = doctor
+engine plot p.csv = engine analyze
+engine tdc p.csv = engine analyze
+report p.csv = engine analyze
+engine export m.nc -> engine has simulate, analyze, check, calibrate, optimum, seek, sweep; elsewhere there is mgdd map
+throttle fit log.csv = throttle identify
+throttle step = throttle track
+throttle track --step 10:50 -> '--reference step:FROM:TO'
+engine analyze p.csv --bore 128 -> '--set bore_mm=X'
+engine optimum --max-pressure 120 -> '--limit p_max_bar=X'
+map export m.nc --dcm -> '--output FILE.dcm'
 engine sweep --soc=-20:5:1 -> --over soc_cad=LOW:HIGH:COUNT
 selftest = rig selftest
 download hd_diesel_128x144 -o d.csv = data get
