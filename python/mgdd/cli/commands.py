@@ -158,7 +158,8 @@ COMMANDS = {
 }
 # Other words for a command.
 _ALSO = {
-    "engine simulate": "run cycle", "engine analyze": "analyse analysis plot report heat-release tdc indicate", "engine check": "trust",
+    "engine simulate": "run cycle", "engine analyze": "analyse analysis plot report heat-release tdc indicate",
+    "engine check": "trust",
     "engine calibrate": "fit calibration", "engine optimum": "optimise optimize best", "engine seek": "search",
     "engine sweep": "grid", "map optimize": "optimise optimum build make", "map export": "convert write",
     "map fit": "build make", "map seek": "search", "map trade-off": "pareto", "map show": "plot", "map diff": "compare",
@@ -166,7 +167,8 @@ _ALSO = {
     "throttle identify": "fit", "throttle track": "control run step", "throttle excite": "signal",
     "rig record": "monitor log", "data info": "read", "data get": "download",
     "data list": "datasets --list-datasets",
-    "preset list": "presets --list-presets", "study": "studies", "rig selftest": "self-test test", "doctor": "info version",
+    "preset list": "presets --list-presets", "study": "studies", "rig selftest": "self-test test",
+    "doctor": "info version",
 }
 # Options of other programs, and what they are here.
 _OPTIONS = {
