@@ -12,7 +12,7 @@ from collections.abc import Iterable
 _LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length
 # Letters that are more than a coincidence, and names that are an answer rather than a list.
 _SHORTEST_STEM, _MOST_NAMES = 3, 4
-_LEAST_ALIKE = 0.7  # a slip of the fingers; at 0.6 --dcm leads to --decimal
+_LEAST_ALIKE = 0.65  # two of three letters are; at 0.6 --dcm leads to --decimal
 # Words of the field, and of other libraries, by what stands for them here.
 _MEANS = {
     word: meant.split()
