@@ -7,9 +7,10 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from mgdd.cli.commands import Parser, UsageError, root_parser
+from mgdd.cli.commands import root_parser
 from mgdd.cli.options import option
 from mgdd.cli.output import emit
+from mgdd.cli.parser import Parser, UsageError
 from mgdd.io.extras import import_extra
 
 

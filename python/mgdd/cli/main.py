@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from mgdd.cli.commands import UsageError, root_parser, understood
+from mgdd.cli.commands import root_parser, understood
+from mgdd.cli.parser import UsageError
 from mgdd.cli.progress import Progress, Stopped, gated_streams
 from mgdd.errors import ConvergenceError, Error, arguments_written
 

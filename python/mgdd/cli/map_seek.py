@@ -23,6 +23,7 @@ from mgdd.io.point_table import read_points
 from mgdd.loop import VirtualEngine, seek
 from mgdd.loop.map_result import MapSearch
 from mgdd.loop.seek_map import Progress, seek_map
+from mgdd.loop.seek_result import SeekResult
 from mgdd.maps import write_map
 from mgdd.plot import map_cells
 from mgdd.plot.style import new_figure
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from mgdd.loop.seek_result import SeekResult
     from mgdd.maps import CalibrationMap
 
 _SEARCH, _SETTLING = Options(seek_map, "visits", "tolerance", "smoothness"), Options(seek_map, "settling")
@@ -89,7 +89,7 @@ def _seek(args: argparse.Namespace) -> None:
         if len(bounds) > 1 and Path(args.output or "").suffix in (".nc", ".csv"):
             raise ParameterError(f"-o {args.output}: {len(bounds)} maps fit into a .dcm or .cdfx only")
         guide = cylinder_of(args, bench.settings["cylinder"]) if args.guide == "model" else None
-        schedule = None if args.drive is None else _schedule(args.drive, list(axes), bench)
+        drive = None if args.drive is None else _drive_of(args.drive, list(axes), bench)
         interrupted, driven = False, None
         try:
             found = seek_map(
@@ -97,8 +97,9 @@ def _seek(args: argparse.Namespace) -> None:
                 record=args.record, on_visit=partial(_say, args), seed=bench.seed,
                 **_SEARCH.given(args), **_SETTLING.given(args),
             )  # fmt: skip
-            if schedule is not None:
-                found, driven = _drive(bench, bounds, found, limits, *schedule)
+            if drive is not None:
+                found, driven = _driven(found, *drive, bounds, limits)
+                interrupted = driven.run.interrupted
         except Interrupted as stop:
             if not isinstance(stop.partial, MapSearch):
                 raise
@@ -118,29 +119,37 @@ def _seek(args: argparse.Namespace) -> None:
         raise Stopped(f"{len(found.visits)} visits are kept")
 
 
-def _schedule(file: str, axes: list[str], bench: VirtualEngine) -> tuple[list[tuple[int, Any]], int]:
-    """Read which point is driven from which cycle on, and how many cycles there are."""
+def _drive_of(file: str, axes: list[str], bench: VirtualEngine) -> tuple[VirtualEngine, int]:
+    """Make the engine of the bench that runs through the points of a file, and say for how many cycles."""
     table = read_points(file, [*axes, "cycles"])
     counts = table["cycles"].to_numpy()
     if not ((counts >= 1.0) & (counts == np.round(counts))).all():
         raise ParameterError(f"--drive {file}: column cycles: must be whole numbers >= 1")
-    begins = np.concatenate([[0.0], np.cumsum(counts)]).astype(int)
-    points = []
-    for k in range(counts.size):
+    schedule, cycle = [], 0
+    for k, count in enumerate(counts.astype(int).tolist()):
         try:
-            points.append(bench.point_at(0).replace(**{name: float(table[name][k]) for name in axes}))
+            schedule.append((cycle, bench.point_at(0).replace(**{name: float(table[name][k]) for name in axes})))
         except ParameterError as error:
             raise ParameterError(f"--drive {file}, point {k + 1}: {error}") from error
-    return list(zip(begins[:-1].tolist(), points, strict=True)), int(begins[-1])
-
-
-def _drive(
-    bench: VirtualEngine, bounds: Any, found: MapSearch, limits: Any, schedule: Any, cycles: int
-) -> tuple[MapSearch, SeekResult]:
-    """Drive the engine of the bench by the map, which learns in every cycle."""
+        cycle += count
     own = bench.settings | {"schedule": schedule}
+    try:
+        return VirtualEngine(own.pop("cylinder"), **own), cycle
+    except ParameterError as error:
+        raise ParameterError(f"--drive {file}: {error}") from error
+
+
+def _driven(
+    found: MapSearch, engine: VirtualEngine, cycles: int, bounds: Any, limits: Any
+) -> tuple[MapSearch, SeekResult]:
+    """Drive an engine by the map, which learns in every cycle; Ctrl-C ends the drive, and the map stays."""
     driver = found.seeker.driver()
-    run = seek(VirtualEngine(own.pop("cylinder"), **own), bounds, seeker=driver, limits=limits, cycles=cycles)
+    try:
+        run = seek(engine, bounds, seeker=driver, limits=limits, cycles=cycles)
+    except Interrupted as stop:
+        if not isinstance(stop.partial, SeekResult):
+            raise
+        run = stop.partial
     return found.driven(driver), run
 
 

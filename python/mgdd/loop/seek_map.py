@@ -121,7 +121,7 @@ def seek_map(
         False to minimise J.
     seeker : MapSearch or MapSeeking, optional
         Go on with an earlier result, whose visits stay in the new one and whose seeker changes, or with a seeker alone;
-        it has inputs, axes, limits and guide of its own.
+        it has inputs, axes, limits, guide and smoothness of its own.
     record : path-like, optional
         A CSV file with a row per visit. Where it holds some, the search goes on behind them as if it had never stopped;
         a record of another search is refused.

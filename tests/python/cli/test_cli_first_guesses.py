@@ -9,7 +9,8 @@ import sys
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.commands import COMMANDS, UsageError, root_parser, understood
+from mgdd.cli.commands import COMMANDS, root_parser, understood
+from mgdd.cli.parser import UsageError
 from typed import Capsys
 
 VERBS = {name.rpartition(" ")[2] for name in COMMANDS}

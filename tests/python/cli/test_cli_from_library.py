@@ -12,8 +12,9 @@ from typing import Literal
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.commands import COMMANDS, Parser, root_parser
+from mgdd.cli.commands import COMMANDS, root_parser
 from mgdd.cli.from_library import Options
+from mgdd.cli.parser import Parser
 from typed import Capsys
 
 

@@ -9,11 +9,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from mgdd.cli import main
+from mgdd.cli import main, map_seek
+from mgdd.loop import VirtualEngine
 from mgdd.maps import read_map
 from typed import Capsys, commands
 
@@ -76,9 +78,34 @@ def test_an_engine_is_driven_and_the_map_learns_on(
     assert np.argwhere(learnt.cells["source"] == "learned").tolist() == [[0, 0], [2, 1]]
 
 
+def test_a_drive_that_is_stopped_keeps_the_map(tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(engine: VirtualEngine, *args: Any, **how: Any) -> Any:
+        made = engine.measure
+
+        def measure() -> Any:
+            if engine.cycle == 12:
+                raise KeyboardInterrupt
+            return made()
+
+        monkeypatch.setattr(engine, "measure", measure, raising=False)
+        return found_by(engine, *args, **how)
+
+    found_by = map_seek.seek
+    monkeypatch.setattr(map_seek, "seek", stopped)
+    file, drive = tmp_path / "map.nc", tmp_path / "drive.csv"
+    drive.write_text("speed_rpm,fuel_mg,cycles\n1300,13,40\n")
+    code = main(["map", "seek", *AXES, *MODEL, "--visits", "5", "--drive", str(drive), "-o", str(file), "--json"])
+    assert code == 130
+    told = json.loads(capsys.readouterr().out)
+    assert told["interrupted"] is True
+    assert told["driven_cycles"] == 12
+    assert read_map(file).provenance["driven"] == "12 cycles"
+
+
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
+        ("speed_rpm,fuel_mg,cycles\n1300,0,9\n", "drive.csv: "),
         ("speed_rpm,cycles\n1300,20\n", "no column 'fuel_mg'"),
         ("speed_rpm,fuel_mg,cycles\n1300,13,2.5\n", "column cycles: must be whole numbers >= 1"),
         ("speed_rpm,fuel_mg,cycles\n1300,13,9\n-1300,13,9\n", "point 2: speed_rpm = -1300 rpm: must be"),

@@ -124,7 +124,7 @@ class MapPlan:
         dwell = dwell_of(task.averaged, task.settling, on_plant=True)
         self._made = partial(
             map_seeker, task.inputs, entries, dwell, task.settings, limits=sides, guide=guide[0],
-            limit_guides=guide[1], start=started(task.start or None, inputs), seed=seed,
+            limit_guides=guide[1], start=started(task.start or None, inputs), smoothness=task.smoothness, seed=seed,
         )  # fmt: skip
         first = self._made().suggest()
         self.start = {**first.at, **first.inputs}

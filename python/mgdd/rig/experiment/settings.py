@@ -236,6 +236,7 @@ class MapTask(Settings):
     tolerance: float | None = _key("number", low=0.0)
     averaged: int | None = _key("integer", low=1, high=10_000)
     settling: int | None = _key("integer", low=0, high=10_000)
+    smoothness: float = _key("number", 0.0, low=0.0)
     settings: Mapping[str, Any] = _key("any", {})
 
 
