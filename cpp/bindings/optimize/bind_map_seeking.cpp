@@ -55,7 +55,7 @@ void bind_map_seeking(py::module_& m) {
       .def(
           "_tell",
           [](BoundMap& b, const InputArray& context, const InputArray& input, double j,
-             const std::vector<double>& limits, bool misfire, double readings) {
+             const std::vector<double>& limits, bool misfire, double readings, const std::vector<double>& sd) {
             const optimize::Inputs at = inputs_of_array(context), applied = inputs_of_array(input);
             optimize::Reading reading;
             reading.components = {&j, 1};
@@ -63,9 +63,9 @@ void bind_map_seeking(py::module_& m) {
             reading.misfire = misfire;
             const auto held = b.use();
             const py::gil_scoped_release free_gil;
-            return static_cast<int>(held->tell(at, applied, reading, readings));
+            return static_cast<int>(held->tell(at, applied, reading, readings, sd));
           },
-          arg("context"), arg("input"), arg("j"), arg("limits"), arg("misfire"), arg("readings"),
+          arg("context"), arg("input"), arg("j"), arg("limits"), arg("misfire"), arg("readings"), arg("sd"),
           "What was read: 0 where it was taken, 1 for a misfire, else it was refused. Releases the GIL.")
       .def(
           "_cells",

@@ -1440,7 +1440,7 @@ class MapSeeking:
         """
         Point and input of the next reading, by what it is expected to raise the objective, and what is not known of it there, as a standard deviation. Releases the GIL.
         """
-    def _tell(self, context: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], j: typing.SupportsFloat | typing.SupportsIndex, limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], misfire: bool, readings: typing.SupportsFloat | typing.SupportsIndex) -> int:
+    def _tell(self, context: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], j: typing.SupportsFloat | typing.SupportsIndex, limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], misfire: bool, readings: typing.SupportsFloat | typing.SupportsIndex, sd: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> int:
         """
         What was read: 0 where it was taken, 1 for a misfire, else it was refused. Releases the GIL.
         """

@@ -46,6 +46,8 @@ class Visit(NamedTuple):
         Cycles behind them.
     failed : bool
         Half of the cycles or more failed.
+    sd : dict of str to float
+        Standard deviations of a cycle within the visit, of ``"j"`` and the limits; 0 where it has one cycle.
     """
 
     at: dict[str, float]
@@ -54,6 +56,7 @@ class Visit(NamedTuple):
     limits: dict[str, float]
     readings: float
     failed: bool
+    sd: dict[str, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -144,6 +147,11 @@ class MapSearch(Result):
         for name in self.seeker.limit_names:
             label = named_label(plain_name(name)[0])
             columns[f"visit_{name}"] = ("visit", [one.limits[name] for one in self.visits], *label)
+            columns[f"visit_{name}_sd"] = (
+                "visit", [one.sd[name] for one in self.visits], label.units, f"{label.long_name}, of a cycle in a visit"
+            )  # fmt: skip
+        scatter = [one.sd["j"] for one in self.visits]
+        columns["visit_j_sd"] = ("visit", scatter, "unit of J", "objective, standard deviation of a cycle in a visit")
         columns["visit_readings"] = ("visit", [one.readings for one in self.visits], "-", "cycles averaged")
         columns["visit_failed"] = ("visit", [float(one.failed) for one in self.visits], "-", "whether it failed")
         return merged(self.cells, labelled_dataset(columns))

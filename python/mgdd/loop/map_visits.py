@@ -78,10 +78,15 @@ def visited(
             if 0.0 < mean_sd < _KNOWN * sd:
                 break
     if failed >= _FAILED * (len(rows) + failed):
-        return Visit(at, inputs, math.nan, dict.fromkeys(names, math.nan), float(len(rows) + failed), failed=True)
+        unread = dict.fromkeys(names, math.nan)
+        none = dict.fromkeys(("j", *names), 0.0)
+        return Visit(at, inputs, math.nan, unread, float(len(rows) + failed), failed=True, sd=none)
     means = np.mean(rows, axis=0).tolist()
+    sds = np.std(rows, axis=0, ddof=1).tolist() if len(rows) > 1 else [0.0] * len(means)
     really = {name: float(np.mean(column)) for name, column in applied.items()}
-    return Visit(at, really, means[0], dict(zip(names, means[1:], strict=True)), float(len(rows)), failed=False)
+    held = dict(zip(names, means[1:], strict=True))
+    scatter = dict(zip(("j", *names), sds, strict=True))
+    return Visit(at, really, means[0], held, float(len(rows)), failed=False, sd=scatter)
 
 
 def tell(seeker: MapSeeking, visit: Visit) -> None:
@@ -89,7 +94,7 @@ def tell(seeker: MapSeeking, visit: Visit) -> None:
     if visit.failed:
         seeker.tell(visit.at, visit.inputs, misfire=True)
     else:
-        seeker.tell(visit.at, visit.inputs, visit.j, visit.limits, readings=visit.readings)
+        seeker.tell(visit.at, visit.inputs, visit.j, visit.limits, readings=visit.readings, sd=visit.sd)
 
 
 class VisitFile:
@@ -100,10 +105,12 @@ class VisitFile:
 
     def __init__(self, path: Path, seeker: MapSeeking) -> None:
         self._path = path
-        names = [*seeker.axes, *seeker.input_names, "j", *seeker.limit_names, "readings", "failed"]
+        read = ["j", *seeker.limit_names]
+        scatter = [f"{name}_sd" for name in read]
+        names = [*seeker.axes, *seeker.input_names, *read, "readings", "failed", *scatter]
         own = hashlib.sha256(json.dumps(encoded(seeker.settings), sort_keys=True).encode())
         self._head = [f"# search {own.hexdigest()[:16]}", ",".join(names)]
-        self._count = (len(seeker.axes), len(seeker.input_names), len(seeker.limit_names))
+        self._count = len(names)
 
     def replayed(self, seeker: MapSeeking) -> Iterator[Visit]:
         """Tell a seeker what the file holds; DataError where it is of another search."""
@@ -120,22 +127,19 @@ class VisitFile:
         if not text.endswith("\n"):  # the last row was cut off as it was written
             lines = lines[:-1]
             self._path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        axes, inputs, limits = self._count
+        read = ["j", *seeker.limit_names]
         for number, line in enumerate(lines[len(self._head) :], 1):
             try:
                 row = [float(entry) for entry in line.split(",")]
-                if len(row) != sum(self._count) + 3:
+                if len(row) != self._count:
                     raise ValueError
             except ValueError:
-                raise DataError(
-                    f"{self._path}: row {number} is {line!r}: must be {sum(self._count) + 3} numbers"
-                ) from None
-            held = row[axes + inputs + 1 : axes + inputs + 1 + limits]
-            visit = Visit(
-                dict(zip(seeker.axes, row, strict=False)),
-                dict(zip(seeker.input_names, row[axes:], strict=False)),
-                row[axes + inputs], dict(zip(seeker.limit_names, held, strict=True)), row[-2], failed=row[-1] == 1.0,
-            )  # fmt: skip
+                raise DataError(f"{self._path}: row {number} is {line!r}: must be {self._count} numbers") from None
+            entries = iter(row)
+            place, inputs, means = ({name: next(entries) for name in names}
+                                    for names in (seeker.axes, seeker.input_names, read))  # fmt: skip
+            visit = Visit(place, inputs, means.pop("j"), means, readings=next(entries), failed=next(entries) == 1.0,
+                          sd=dict(zip(read, entries, strict=True)))  # fmt: skip
             asked = seeker.suggest()
             if asked.at != visit.at:
                 at = ", ".join(f"{name} = {value:g}" for name, value in asked.at.items())
@@ -149,6 +153,6 @@ class VisitFile:
     def write(self, visit: Visit) -> None:
         """Add a row."""
         row = [*visit.at.values(), *visit.inputs.values(), visit.j, *visit.limits.values(), visit.readings,
-               float(visit.failed)]  # fmt: skip
+               float(visit.failed), *visit.sd.values()]  # fmt: skip
         with self._path.open("a", encoding="utf-8") as out:
             out.write(",".join(map(repr, row)) + "\n")

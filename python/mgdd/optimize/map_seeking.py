@@ -228,6 +228,7 @@ class MapSeeking(_core.optimize.MapSeeking):
         *,
         misfire: bool = False,
         readings: float = 1.0,
+        sd: Mapping[str, float] | None = None,
     ) -> None:
         """Accept what was read at a point with these inputs; a refused reading changes nothing.
 
@@ -243,6 +244,9 @@ class MapSeeking(_core.optimize.MapSeeking):
             The visit gave no reading: the engine failed there.
         readings : float
             How many readings `J` and `limits` are the mean of.
+        sd : mapping of str to float, optional
+            Standard deviations of these readings, of ``"j"`` and the limits: no reading is taken for surer than
+            that. Without them their noise is learnt of what the means do not explain.
 
         Raises
         ------
@@ -265,7 +269,13 @@ class MapSeeking(_core.optimize.MapSeeking):
                 raise ShapeError(f"limits has {len(values)} entries: must be {', '.join(held) or 'left out'}")
         if not readings > 0.0 or not math.isfinite(readings):
             raise ParameterError.of("readings", readings, "> 0, how many the mean is of")
-        status = self._tell(context, applied, 0.0 if misfire else float(J or 0.0), values, misfire, float(readings))
+        own = [0.0] * (1 + len(held))
+        if sd is not None:
+            own = _numbers("sd", sd, ["j", *held])
+            if min(own) < 0.0:
+                raise ParameterError.of("sd", dict(sd), ">= 0")
+        told = 0.0 if misfire else float(J or 0.0)
+        status = self._tell(context, applied, told, values, misfire, float(readings), own)
         if status > 1:
             raise DataError(f"J = {J!r}, limits = {values}: {_REFUSED[min(status - 3, 2)]}")
 

@@ -184,6 +184,79 @@ TEST(MapSeeking, AskFindsTheBestOfAPointBetweenTheCells) {
   EXPECT_LT(lost, 0.6);
 }
 
+TEST(MapSeeking, AnOddVisitIsMadeAgainAndDoesNotSpoilTheMap) {
+  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
+  for (const double lie : {-25.0, 25.0}) {
+    for (const int when : {7, 11}) {
+      MapSeeking search(settings(6, &rough));
+      visited(search, plant, when, 6);
+      const MapSeeking::Visit visit = search.suggest();
+      const double torque = plant.torque(visit.context, visit.input[0]) + lie;
+      const std::array<double, 1> knock{plant.knock(visit.context, visit.input[0])};
+      search.tell(visit.context, visit.input, {.components = {&torque, 1}, .limits = knock});
+      const MapSeeking::Visit again = search.suggest();
+      EXPECT_EQ(again.context, visit.context) << lie << ' ' << when;
+      EXPECT_EQ(again.input, visit.input) << lie << ' ' << when;
+      const Judged found = visited(search, plant, 6, 60);
+      EXPECT_LT(found.worst_loss, 1.0) << lie << ' ' << when;
+      EXPECT_LT(found.worst_knock, 1.05 * knock_limit) << lie << ' ' << when;
+    }
+  }
+}
+
+TEST(MapSeeking, ATrueSurpriseIsBelievedOnceItIsReadTwice) {
+  const Plant plant, worn{.octane = 0.0, .mbt_shift = 0.0, .scale = 0.85};
+  MapSeeking search(settings(7, &plant));
+  visited(search, plant, 8, 7);
+  int repeats = 0;
+  MapSeeking::Visit before = search.suggest();
+  for (std::uint64_t k = 0; k < 12; ++k) {
+    read(search, worn, before.context, before.input, 700 + k);
+    const MapSeeking::Visit next = search.suggest();
+    repeats += next.context == before.context && next.input == before.input ? 1 : 0;
+    before = next;
+  }
+  EXPECT_GE(repeats, 1);
+  EXPECT_LE(repeats, 6);
+  double off = 0.0;
+  for (std::size_t c = 0; c < search.cells(); ++c) {
+    const MapSeeking::Best best = search.best(c);
+    off += std::abs(best.expected - worn.torque(search.cell(c), best.input[0])) / 12.0;
+  }
+  EXPECT_LT(off, 5.0);  // N m of the 16 that it has lost
+}
+
+TEST(MapSeeking, WhereNoInputIsSafeTheMapGivesTheOneThatMostLikelyIs) {
+  const Plant plant, rough{.octane = -1.0, .mbt_shift = 1.0, .scale = 0.9};
+  MapSeekingSettings own = settings(5, &rough);
+  own.limits = {{"knock", 0.02}};  // some cells keep it nowhere, and late sparks knock least
+  MapSeeking search(own);
+  visited(search, plant, 10, 5);
+  int unsafe = 0;
+  for (std::size_t c = 0; c < search.cells(); ++c) {
+    const MapSeeking::Best best = search.best(c);
+    if (best.excess <= 0.0) continue;
+    ++unsafe;
+    EXPECT_LT(best.input[0], -7.0) << c;
+    EXPECT_LT(search.holds(c, 0), 0.95) << c;
+  }
+  EXPECT_GT(unsafe, 1);
+  EXPECT_LT(unsafe, static_cast<int>(search.cells()));
+}
+
+TEST(MapSeeking, LookingAtTheMapOfADriveChangesNothing) {
+  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
+  MapSeeking looked(settings(8, &rough)), left(settings(8, &rough));
+  for (std::uint64_t k = 0; k < 14; ++k) {
+    const Inputs at = point(1.3 + 0.2 * static_cast<double>(k % 5), 0.4 + 0.1 * static_cast<double>(k % 3));
+    looked.best(k % looked.cells());
+    const Inputs asked = left.ask(at);
+    EXPECT_EQ(looked.ask(at), asked) << k;
+    read(looked, plant, at, asked, 800 + k);
+    read(left, plant, at, asked, 800 + k);
+  }
+}
+
 TEST(MapSeeking, AskAndTellAllocateNothing) {
   const Plant plant;
   MapSeeking search(settings(3, &plant));
@@ -215,6 +288,9 @@ TEST(MapSeeking, GoesOnBitForBitFromItsState) {
   }
   StateColumns broken = save_state(search);
   broken["place3"][0] = 1.5;
+  EXPECT_THROW(restore_state(copy, broken), ParameterError);
+  broken = save_state(search);
+  broken["limit0_within"][0] = -1.0;
   EXPECT_THROW(restore_state(copy, broken), ParameterError);
 }
 

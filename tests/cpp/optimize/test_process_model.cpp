@@ -173,5 +173,43 @@ TEST(ProcessModel, MeansAreKeptApartWhereWhatLiesBetweenThemIsMoreThanTheirNoise
   }
 }
 
+TEST(ProcessModel, NoReadingIsSurerThanThoseOfAVisitWereAmongThemselves) {
+  for (const double within : {0.0, 0.7}) {
+    ProcessModel model({.inputs = 2, .memory = 1e9});
+    for (std::uint64_t k = 0; k < 20; ++k) {
+      const Inputs z = at(random::uniform(3, 1, k), random::uniform(3, 2, k));
+      model.scattered(within, 25.0);
+      model.record(z, surface(z) + 0.02 * random::normal(3, 3, k), at(0.5, 0.5), 25.0);
+    }
+    model.fit(at(0.5, 0.5));
+    if (within > 0.0) {
+      EXPECT_NEAR(model.noise_sd(), within, 1e-12);
+    } else {
+      EXPECT_LT(model.noise_sd(), 0.4);  // of 0.02 times 5
+    }
+  }
+}
+
+TEST(ProcessModel, AnOddReadingCountsOnceItIsReadAgain) {
+  const Inputs here = at(0.31, 0.62), about = at(0.5, 0.5);
+  InputTable asked(1, 2);
+  asked.row(0) = here.transpose();
+  const auto known = [&](ProcessModel& model) {
+    model.fit(about);
+    model.predict(asked, 1);
+    return model.mean(0);
+  };
+  for (const double second : {0.0, 4.0}) {
+    ProcessModel model = told(30, 0.1, {.alike = 0.01, .repeated = true});
+    const double before = known(model);
+    EXPECT_GT(model.record(here, before + 4.0, about), 100.0);
+    EXPECT_NEAR(known(model), before, 0.2) << "it is not believed alone";
+    const double odd = model.record(here, before + second, about);
+    EXPECT_LT(odd, 9.0) << second;
+    const double after = known(model);
+    EXPECT_NEAR(after, before + second, 0.2 + 0.5 * second) << second;  // its neighbours still speak against it
+  }
+}
+
 }  // namespace
 }  // namespace mgdd::optimize

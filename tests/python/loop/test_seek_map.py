@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +37,10 @@ def knock(x: dict[str, float], *, octane: float = 0.0) -> float:
 class SparkEngine:
     """A function of point and spark that reads with noise, and remembers where it was asked."""
 
-    def __init__(self, seed: int, *, fails: Any = None, ends_after: int | None = None) -> None:
-        self.draw, self.fails, self.ends_after = np.random.default_rng(seed), fails, ends_after
+    def __init__(
+        self, seed: int, *, fails: Any = None, ends_after: int | None = None, lies: Mapping[int, float] | None = None
+    ) -> None:
+        self.draw, self.fails, self.ends_after, self.lies = np.random.default_rng(seed), fails, ends_after, lies or {}
         self.asked = list[dict[str, float]]()
 
     def __call__(self, x: dict[str, float]) -> Any:
@@ -47,7 +50,8 @@ class SparkEngine:
         noise = self.draw.standard_normal(2)
         if self.fails is not None and self.fails(x):
             return None
-        return torque(x) + 0.2 * noise[0], {"knock": knock(x) + 0.01 * noise[1]}
+        lie = self.lies.get(len(self.asked) - 1, 0.0)
+        return torque(x) + 0.2 * noise[0] + lie, {"knock": knock(x) + 0.01 * noise[1]}
 
 
 def rough(x: dict[str, float]) -> float:
@@ -83,6 +87,17 @@ def test_a_rough_model_and_ten_visits_make_the_map() -> None:
         assert found.findings == ()
         assert isinstance(found.map, CalibrationMap)
         assert found.map.cells["support"].sum() == 10
+
+
+@pytest.mark.parametrize(("visit", "lie"), [(3, -20.0), (7, -20.0), (8, 20.0), (13, -20.0), (15, 20.0)])
+def test_one_wrong_reading_is_taken_again_and_costs_a_visit(visit: int, lie: float) -> None:
+    engine = SparkEngine(visit, lies={visit: lie})
+    found = seek_map(engine, SPARK, AXES, visits=16, seed=visit, **GUIDED)
+    assert losses(found).max() < 0.5
+    assert max(map(knock, engine.asked)) < 1.05 * KNOCK
+    assert found.findings == ()
+    if 3 < visit < 15:
+        assert engine.asked[visit + 1] == engine.asked[visit]
 
 
 def test_without_the_model_more_visits_do() -> None:
@@ -130,7 +145,7 @@ def test_a_record_goes_on_as_if_it_had_never_stopped(tmp_path: Path) -> None:
         with pytest.raises(DataError, match="another search"):
             seek_map(SparkEngine(3), SPARK, AXES, visits=12, record=file, **{**GUIDED, "seed": 3, **other})
     rows = file.read_text(encoding="utf-8").splitlines()
-    for edited, what in (("9" + rows[4][1:], "another point"), (rows[4] + ",1.0", "must be 7 numbers")):
+    for edited, what in (("9" + rows[4][1:], "another point"), (rows[4] + ",1.0", "must be 9 numbers")):
         file.write_text("\n".join([*rows[:4], edited, ""]), encoding="utf-8")
         with pytest.raises(DataError, match=what):
             seek_map(SparkEngine(3), SPARK, AXES, visits=12, record=file, seed=3, **GUIDED)
@@ -191,6 +206,10 @@ def test_the_virtual_engine_is_driven_over_its_map() -> None:
     driver = found.seeker.driver()
     run = seek(drive, {"soc_cad": (-20.0, 8.0)}, seeker=driver, limits=limits, cycles=120)
     assert found.seeker.readings == before + 120
+    assert found.seeker.doubts == 0  # single cycles scatter as those of the visits did
+    scatter = found.dataset["visit_p_max_bar_sd"]
+    assert scatter.attrs["units"] == "bar"
+    assert 0.2 < float(scatter.min()) < float(scatter.max()) < 5.0
     after = found.driven(driver).map
     assert after.provenance["driven"] == "120 cycles"
     assert set(after.cells["source"][driver.readings > 0.0]) == {"learned"}

@@ -21,9 +21,10 @@ constexpr int fewest_weighed = 4;
 constexpr double most_trusted = 81.0;   // of what a variance is multiplied by: nine standard deviations
 constexpr double most_outliers = 0.25;  // of the readings: where there are more, the numbers are wrong and not they
 constexpr int waking_readings = 3;
-constexpr double waking_rise = 1e3;    // of what all earlier readings span
-constexpr double least_noise = 1e-12;  // of a reading
-constexpr double young = 0.1;          // memories, in which little has wandered
+constexpr double waking_rise = 1e3;          // of what all earlier readings span
+constexpr Eigen::Index guided_readings = 3;  // from which on those of a guide may be odd
+constexpr double least_noise = 1e-12;        // of a reading
+constexpr double young = 0.1;                // memories, in which little has wandered
 
 }  // namespace
 
@@ -63,7 +64,7 @@ double ProcessModel::middle() const noexcept {
 }
 
 double ProcessModel::noise_sd() const noexcept {
-  return settings_.noise_sd.value_or(std::exp(numbers_[0] + numbers_[1]));
+  return settings_.noise_sd.value_or(std::max(std::exp(numbers_[0] + numbers_[1]), std::sqrt(within_)));
 }
 
 void ProcessModel::tabulate(std::int64_t reading) noexcept {
@@ -126,23 +127,46 @@ int ProcessModel::crowded_reading(const Inputs& about) noexcept {
 int ProcessModel::alike_reading(const Inputs& z, double readings) noexcept {
   if (settings_.alike < 0.0 || !begun_) return -1;
   refresh();
-  double* const point = &asked_(0, 0);
-  kernel_.describe(z, point);
   for (std::int64_t i = 0; i < count_; ++i) {
-    const double* const own = &points_(i, 0);
-    const double off = (points_.row(i).head(z.size()).transpose() - z).cwiseAbs().maxCoeff();
-    if (off > settings_.alike || !trusted(i) || ages_[i] > young * settings_.memory) continue;
-    const double between = kernel_.covariance(point, point, now_) + kernel_.covariance(own, own, now_) -
-                           2.0 * kernel_.covariance(point, own, now_);
-    if (between * (averaged_[i] + readings) <= now_.noise_variance) return static_cast<int>(i);
+    if (!trusted(i) || (settings_.repeated && weighed_[i] > 1.0) || ages_[i] > young * settings_.memory) continue;
+    if (between(z, i) * (averaged_[i] + readings) <= now_.noise_variance) return static_cast<int>(i);
   }
   return -1;
 }
 
+// Variance of what lies between a reading and an input; none is that far where they are not alike.
+double ProcessModel::between(const Inputs& z, std::int64_t reading) noexcept {
+  const double off = (points_.row(reading).head(z.size()).transpose() - z).cwiseAbs().maxCoeff();
+  if (off > settings_.alike) return std::numeric_limits<double>::infinity();
+  double* const point = &asked_(0, 0);
+  kernel_.describe(z, point);
+  const double* const own = &points_(reading, 0);
+  return kernel_.covariance(point, point, now_) + kernel_.covariance(own, own, now_) -
+         2.0 * kernel_.covariance(point, own, now_);
+}
+
+// Where the newest reading was odd and this one was taken of the same input, the square of what they differ by, in
+// standard deviations; infinite elsewhere. Where they agree both are right.
+double ProcessModel::agreement(const Inputs& z, double value, double readings) noexcept {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  if (!settings_.repeated || !begun_ || count_ == 0) return none;
+  refresh();
+  Eigen::Index newest = 0;
+  ages_.head(count_).minCoeff(&newest);
+  const double apart = between(z, newest);
+  if (!(weighed_[newest] > 1.0) || !std::isfinite(apart)) return none;
+  const double off = value - values_[newest];
+  const double odd = off * off / (apart + now_.noise_variance * (1.0 / readings + 1.0 / averaged_[newest]));
+  if (scatter_of(odd) > 1.0) return none;
+  scatter_[newest] = weighed_[newest] = 1.0;
+  factored_ = false;
+  return odd;
+}
+
 double ProcessModel::record(const Inputs& z, double value, const Inputs& about, double readings) noexcept {
-  const double odd = oddness(z, value, readings);
+  const double odd = std::min(agreement(z, value, readings), oddness(z, value, readings));
   ages_.head(count_).array() += 1.0;
-  const int known = scatter_of(odd) <= most_trusted ? alike_reading(z, readings) : -1;
+  const int known = scatter_of(odd) <= (settings_.repeated ? 1.0 : most_trusted) ? alike_reading(z, readings) : -1;
   if (known >= 0) {
     averaged_[known] += readings;
     const double share = readings / averaged_[known];
@@ -161,7 +185,7 @@ double ProcessModel::record(const Inputs& z, double value, const Inputs& about, 
   values_[at] = value;
   ages_[at] = 0.0;
   averaged_[at] = readings;
-  scatter_[at] = weighed_[at] = told_ < more_readings ? 1.0 : scatter_of(odd);
+  scatter_[at] = weighed_[at] = !settings_.repeated && told_ < more_readings ? 1.0 : scatter_of(odd);
   ++told_;
   if (tables_known_) tabulate(at);
   factored_ = false;
@@ -169,7 +193,8 @@ double ProcessModel::record(const Inputs& z, double value, const Inputs& about, 
 }
 
 double ProcessModel::oddness(const Inputs& z, double value, double readings) noexcept {
-  if (settings_.labels || !begun_ || count_ < 3 * static_cast<std::int64_t>(settings_.inputs + 1)) return 1.0;
+  const auto enough = settings_.repeated && kernel_.guided() ? guided_readings : 3 * (settings_.inputs + 1);
+  if (settings_.labels || !begun_ || count_ < enough) return 1.0;
   refresh();
   double* const point = &asked_(0, 0);
   double* const own = &kernels_(0, 0);
@@ -227,6 +252,14 @@ bool ProcessModel::wakes_up() const noexcept {
   return elsewhere && news == waking_readings;
 }
 
+void ProcessModel::scattered(double sd, double readings) noexcept {
+  const double freedom = readings - 1.0;
+  if (!(sd > 0.0 && freedom > 0.0)) return;
+  within_freedom_ = std::min(within_freedom_ + freedom, settings_.memory);
+  within_ += std::min(1.0, freedom / within_freedom_) * (sd * sd - within_);
+  factored_ = false;
+}
+
 void ProcessModel::age(double cycles) noexcept {
   ages_.head(count_).array() += cycles;
   factored_ = false;
@@ -234,6 +267,7 @@ void ProcessModel::age(double cycles) noexcept {
 
 void ProcessModel::forget() noexcept {
   count_ = told_ = 0;
+  within_ = within_freedom_ = 0.0;
   begun_ = factored_ = tables_known_ = false;
   scatter_.setOnes();
   weighed_.setOnes();

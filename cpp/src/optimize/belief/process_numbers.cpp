@@ -41,7 +41,8 @@ ProcessModel::Scales ProcessModel::scales_of(const Numbers& numbers) const noexc
   Scales out;
   out.bend = std::exp(numbers[0]);
   out.guide = kernel_.guided() ? std::exp(numbers[numbers.size() - 1]) : 0.0;
-  const double noise = settings_.noise_sd.value_or(out.bend * std::exp(numbers[1])), rest = std::exp(numbers[2]);
+  const double noise = settings_.noise_sd.value_or(std::max(out.bend * std::exp(numbers[1]), std::sqrt(within_))),
+               rest = std::exp(numbers[2]);
   out.noise_variance = noise * noise;
   out.rest = rest * rest;
   const double place = std::exp(numbers[3 + settings_.inputs]), level = std::exp(numbers[4 + settings_.inputs]);

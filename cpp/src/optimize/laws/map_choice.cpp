@@ -152,6 +152,14 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     return visit_;
   }
   know_cells();
+  suggested_ = true;
+  if (again_ > 0) {  // nothing is learnt of the map, but whether the reading was right
+    put(0, scaled_context(last_context_), scaled(last_input_));
+    j_.predict(candidates_, 1);
+    searched_ = false;
+    visit_ = {last_context_, last_input_, 0.0, j_.sd(0)};
+    return visit_;
+  }
   double most = -1.0;
   int next = -1;
   for (std::size_t c = 0; c < cells(); ++c) {
@@ -273,9 +281,10 @@ MapSeeking::Best MapSeeking::best(std::size_t c) noexcept {
     return {unscaled(first_input(cell(c))), settings_.space.upper - settings_.space.lower, nan, nan, nan, nan};
   }
   know_cells();
-  const int at = static_cast<int>(c) * per_place;
+  const int at = places_[c].known;
   const double expected = (settings_.maximize ? 1.0 : -1.0) * j_.mean(at);
-  Best out{unscaled(places_[c].best), Inputs::Zero(inputs_), expected, j_.sd(at), 0.0, places_[c].excess};
+  const Inputs input = unscaled(candidates_.row(at).tail(inputs_).transpose());
+  Best out{input, Inputs::Zero(inputs_), expected, j_.sd(at), 0.0, over_[static_cast<std::size_t>(at)]};
   sample(c, out);
   return out;
 }
@@ -288,7 +297,7 @@ void MapSeeking::know_cells() noexcept {
 double MapSeeking::holds(std::size_t c, std::size_t i) noexcept {
   if (!known()) return 0.0;
   know_cells();
-  const int at = static_cast<int>(c) * per_place;
+  const int at = places_[c].known;
   const double sd = limited_[i].sd(at), mean = limited_[i].excess(at, 0.0);
   return 0.5 * std::erfc(mean / (std::max(sd, 1e-300) * std::numbers::sqrt2));
 }

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int map_rounds = 6;
 constexpr double map_width = 0.1, map_shrinks = 0.5;  // ranges, per round
+constexpr double least_sd = 1e-12;                    // scales of a limit
 constexpr double likely_quantile = 1.0;               // of what is asked where nothing is safe
 constexpr double reach_beyond_read = 2.0;             // reaches
 // Likely to fail by 3 to 1: cells that were never read are not given up for a failure beside them.
@@ -36,9 +37,9 @@ void MapSeeking::put(int row, const Inputs& context, const Inputs& z) noexcept {
 }
 
 // The largest excess of any limit, in its scale, of every candidate: for the map, for what is asked, and where nothing
-// is safe.
+// is safe; and the largest mean of one in standard deviations.
 void MapSeeking::judge(int points) noexcept {
-  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_})
+  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &odds_})
     std::fill_n(one->begin(), points, -largest_reading);
   for (LimitProcess& limited : limited_) {
     limited.model().predict(candidates_, points);
@@ -48,6 +49,7 @@ void MapSeeking::judge(int points) noexcept {
       over_[at] = std::max(over_[at], mean + quantile_ * sd);
       cautious_[at] = std::max(cautious_[at], mean + cautious_quantile_ * sd);
       mean_over_[at] = std::max(mean_over_[at], mean + likely_quantile * sd / limited.widening());
+      odds_[at] = std::max(odds_[at], mean / std::max(sd, least_sd));
     }
   }
   if (!failing_.by_input()) return;
@@ -56,6 +58,7 @@ void MapSeeking::judge(int points) noexcept {
     over_[at] = std::max(over_[at], likely);
     cautious_[at] = std::max(cautious_[at], likely);
     mean_over_[at] = std::max(mean_over_[at], mean);
+    odds_[at] = std::max(odds_[at], mean);
   });
 }
 
@@ -88,11 +91,11 @@ void MapSeeking::keep_best(Place& place, int from, int count, bool smooth) noexc
     if (better) best = p;
   }
   place.best = candidates_.row(best).tail(inputs_).transpose();
-  place.excess = over_[static_cast<std::size_t>(best)];
 }
 
-// Of every place its best input, some from everywhere, and a cloud around the best at distances of all sizes.
-void MapSeeking::scatter(std::span<const Place> places) noexcept {
+// Of every place its best input, some from everywhere, and a cloud around the best at distances of all sizes; `sure`:
+// with the covariances of J.
+void MapSeeking::scatter(std::span<const Place> places, bool sure) noexcept {
   int row = 0;
   for (const Place& place : places) {
     put(row++, place.context, place.best);
@@ -112,7 +115,11 @@ void MapSeeking::scatter(std::span<const Place> places) noexcept {
     }
   }
   judge(row);
-  j_.predict(candidates_, row);
+  if (sure) {
+    j_.predict(candidates_, row);
+  } else {
+    j_.predict_means(candidates_, row);
+  }
 }
 
 // Around the best of every place, ever nearer.
@@ -144,7 +151,7 @@ void MapSeeking::narrow(std::span<Place> places, bool smooth) noexcept {
 void MapSeeking::search(std::span<Place> places) noexcept {
   for (Place& place : places)
     place.best = place.from;
-  scatter(places);
+  scatter(places, false);
   int from = 0;
   for (Place& place : places) {
     keep_best(place, from, per_place, false);
@@ -153,7 +160,7 @@ void MapSeeking::search(std::span<Place> places) noexcept {
   narrow(places, false);
   if (settings_.smoothness > 0.0) narrow(places, true);
   know_edges(places);
-  scatter(places);
+  scatter(places, true);
   from = 0;
   for (const Place& place : places) {
     know_roughness(place, from, per_place, true);
@@ -199,9 +206,9 @@ void MapSeeking::know_edges(std::span<const Place> places) noexcept {
   }
 }
 
-// The candidates of every place that keep its limits, the best one among them in any case. Where none does, less doubt
-// about its limits is worth what J ranges over.
-void MapSeeking::choose_safe(std::span<const Place> places) noexcept {
+// The candidates of every place that keep its limits, the best one among them in any case. Where none does, the map
+// gives the one that most likely does, and less doubt about its limits is worth what J ranges over.
+void MapSeeking::choose_safe(std::span<Place> places) noexcept {
   int count = 0;
   for (std::size_t c = 0; c < places.size(); ++c) {
     safe_from_[c] = count;
@@ -212,7 +219,10 @@ void MapSeeking::choose_safe(std::span<const Place> places) noexcept {
       high = std::max(high, j_.mean(p));
       if (p == from || over_[static_cast<std::size_t>(p)] <= 0.0) safe_[static_cast<std::size_t>(count++)] = p;
     }
+    places[c].known = from;
     if (over_[static_cast<std::size_t>(from)] <= 0.0) continue;
+    const auto odds = odds_.begin() + from;
+    places[c].known += static_cast<int>(std::min_element(odds, odds + per_place) - odds);
     for (std::size_t i = 0; i < limited_.size(); ++i)
       multipliers_[c * limited_.size() + i] = high - low;
   }

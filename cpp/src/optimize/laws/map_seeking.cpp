@@ -17,6 +17,8 @@ constexpr double alike = 0.01;  // ranges: readings closer than that are average
 // of the bounds in its place. It holds that much over all points; wider ones let the first readings explore for
 // nothing.
 constexpr double missed = -3.5, missed_sd = 1.0, rest = -3.0, factor_sd = 0.2, place_sd = 0.1;
+// A pressure or its rise is not of the combustion alone: far off a limit it says less of the factor near it.
+constexpr double limit_factor_sd = 0.3;
 constexpr double powers = 10.0;             // that a limit spans, for its logarithm
 constexpr std::int64_t calm_readings = 10;  // after a doubt
 constexpr std::size_t most_cells = 10'000;
@@ -49,6 +51,7 @@ ProcessModel::Settings map_process_settings(const MapSeekingSettings& s, int mos
 ProcessModel j_process(const MapSeekingSettings& s, int most_points) {
   ProcessModel::Settings out = map_process_settings(s, most_points);
   out.noise_sd = s.noise_sd;
+  out.repeated = true;
   if (!s.guide.empty()) out.guide.surface = s.guide[0];
   out.guide.sign = s.maximize ? 1.0 : -1.0;
   return ProcessModel(out);
@@ -58,7 +61,9 @@ std::vector<LimitProcess> map_limit_processes(const MapSeekingSettings& s, int m
   std::vector<LimitProcess> out;
   for (std::size_t i = 0; i < s.limits.size(); ++i) {
     const Surface guide = s.limit_guides.empty() ? Surface{} : s.limit_guides[i];
-    out.emplace_back(s.limits[i], map_process_settings(s, most_points), guide, 0, powers);
+    ProcessModel::Settings own = map_process_settings(s, most_points);
+    own.guide.factor_sd = limit_factor_sd;
+    out.emplace_back(s.limits[i], own, guide, 0, powers);
   }
   return out;
 }
@@ -148,6 +153,7 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
       lowest_(scaled(settings_.space.start)),
       highest_(lowest_),
       last_context_(Inputs::Zero(context_)),
+      last_input_(settings_.space.start),
       visit_{Inputs::Zero(context_), settings_.space.start},
       asked_(settings_.space.start),
       candidates_(InputTable::Zero(points_of(settings_, per_place), context_ + inputs_)),
@@ -157,7 +163,7 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
   for (std::size_t c = 0; c < places_.size(); ++c)
     places_[c] = {c < cells() ? scaled_context(cell(c)) : Inputs(Inputs::Zero(context_)), lowest_, lowest_};
   const auto points = static_cast<std::size_t>(candidates_.rows());
-  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &rough_, &effect_})
+  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &odds_, &rough_, &effect_})
     one->assign(points, 0.0);
   safe_.assign(points, 0);
   safe_from_.assign(places_.size() + 1, 0);
@@ -227,8 +233,8 @@ bool MapSeeking::known() const noexcept {
   return enough(j_) && std::ranges::all_of(limited_, [&](const LimitProcess& one) { return enough(one.model()); });
 }
 
-TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Reading& reading,
-                            double readings) noexcept {
+TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Reading& reading, double readings,
+                            std::span<const double> sd) noexcept {
   if (!reading.misfire) {
     if (reading.components.size() != 1) return TellStatus::wrong_component_count;
     if (reading.limits.size() != limited_.size()) return TellStatus::wrong_limit_count;
@@ -239,22 +245,31 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
   z.head(context_) = scaled_context(context);
   z.tail(inputs_) = scaled(input);
   last_context_ = context;
+  last_input_ = input;
   ++told_;
   searched_ = false;
-  for (Place& place : places_)
-    place.from = place.best;
+  for (Place& place : places_) {
+    if (suggested_ || &place == &places_.back()) place.from = place.best;
+  }
+  suggested_ = false;
   for (std::size_t c = 0; c < cells(); ++c) {
     if (cell(c) == context) failures_[c] = reading.misfire ? failures_[c] + 1.0 : 0.0;
   }
   failing_.record(z, !reading.misfire, z);
   failing_.fit(z);
-  if (reading.misfire) return TellStatus::misfire;
+  if (reading.misfire) {
+    again_ = 0;
+    return TellStatus::misfire;
+  }
   lowest_ = j_.count() == 0 ? Inputs(z.tail(inputs_)) : lowest_.cwiseMin(z.tail(inputs_));
   highest_ = j_.count() == 0 ? lowest_ : highest_.cwiseMax(z.tail(inputs_));
-  const bool surprising =
-      surprise_.add(j_.record(z, settings_.maximize ? reading.components[0] : -reading.components[0], z, readings));
+  const auto scatter = [&](std::size_t channel) { return channel < sd.size() ? sd[channel] : 0.0; };
+  j_.scattered(scatter(0), readings);
+  const double odd = j_.record(z, settings_.maximize ? reading.components[0] : -reading.components[0], z, readings);
+  const bool surprising = surprise_.add(odd);
+  again_ = odd > odd_visit && again_ < most_again ? again_ + 1 : 0;
   for (std::size_t i = 0; i < limited_.size(); ++i)
-    limited_[i].record(z, reading.limits[i], z, readings);
+    limited_[i].record(z, reading.limits[i], z, readings, scatter(1 + i));
   if (++since_doubt_ >= calm_readings && surprising) {
     j_.age(doubt_age * settings_.memory_readings);
     surprise_.reset();
@@ -279,6 +294,9 @@ void MapSeeking::reseed(std::uint64_t seed) noexcept {
 
 void MapSeeking::require_usable() const {
   failing_.require_usable();
+  j_.require_usable();
+  for (const LimitProcess& limited : limited_)
+    limited.model().require_usable();
   for (const double failures : failures_)
     require_in(closed(0.0, 1e12), "failures", failures);
   for (const Place& place : places_) {

@@ -57,8 +57,10 @@ LimitProcess::LimitProcess(const Limit& limit, ProcessModel::Settings settings, 
       model_(settings_of(limit, std::move(settings), guide, logarithm_)) {}
 
 // The form follows the readings; with a guide it stays that of the guide.
-void LimitProcess::record(const Inputs& z, double value, const Inputs& about, double readings) noexcept {
+void LimitProcess::record(const Inputs& z, double value, const Inputs& about, double readings, double sd) noexcept {
   const bool was = logarithm_;
+  if (was) sd /= std::max(value / limit_.upper, least_share);
+  model_.scattered(sd, readings);
   model_.record(z, learnt_of(limit_, was, value), about, readings);
   if (guided_) return;
   // In a logarithm what lies near zero looks like an outlier: there the new reading counts, and is weighed without it.

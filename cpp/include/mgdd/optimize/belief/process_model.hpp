@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/belief/process_kernel.hpp"
 
@@ -33,7 +34,8 @@ class ProcessModel {
     bool labels = false;                   ///< readings are below or above 0: of the rarer ones those far away are kept
     double missed = -1.0, missed_sd = 0.7;  ///< logarithm of the share of all bends that the guide is expected to miss
     double rest = -4.5;                     ///< logarithm of the size of the rest over the bend, expected
-    double alike = -1.0;  ///< ranges of every input, within which young readings may be averaged; below 0: never
+    double alike = -1.0;    ///< ranges of every input, within which young readings may be averaged; below 0: never
+    bool repeated = false;  ///< whether odd readings are taken again: until then they count little
     std::uint64_t seed = 0;
     ProcessGuide guide{};
   };
@@ -46,6 +48,11 @@ class ProcessModel {
   /// Takes a reading at `z`, or the mean of several; where all places are taken, the oldest of those near `about` makes
   /// room. The square of how far it lies from what was expected, in standard deviations; 1 where little is known.
   double record(const Inputs& z, double value, const Inputs& about, double readings = 1.0) noexcept;
+  /// ParameterError for a restored state that no readings leave.
+  void require_usable() const { require_in(closed(0.0, 1e300), "variance within visits", within_); }
+
+  /// What readings that were averaged scattered by among themselves: no reading is surer than that.
+  void scattered(double sd, double readings) noexcept;
   /// Looks for better numbers of the process and makes predictions possible; 2 readings at least, 1 with a guide.
   void fit(const Inputs& about) noexcept;
 
@@ -84,6 +91,7 @@ class ProcessModel {
   void retell(const F& told) noexcept {
     for (std::int64_t i = 0; i < count_; ++i)
       values_[i] = told(values_[i]);
+    within_ = within_freedom_ = 0.0;
     begun_ = factored_ = false;
     settled_bend_.reset();
   }
@@ -120,6 +128,8 @@ class ProcessModel {
     v(name + "_weighed", self.weighed_);
     v(name + "_averaged", self.averaged_);
     v(name + "_numbers", self.numbers_);
+    v(name + "_within", self.within_);
+    v(name + "_within_freedom", self.within_freedom_);
     v(name + "_settled_bend", self.settled_bend_);
     if constexpr (!std::is_const_v<Self>) self.tables_known_ = self.factored_ = false;
   }
@@ -155,7 +165,9 @@ class ProcessModel {
   void factor() noexcept;
   void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
+  double between(const Inputs& z, std::int64_t reading) noexcept;
   int alike_reading(const Inputs& z, double readings) noexcept;
+  double agreement(const Inputs& z, double value, double readings) noexcept;
   double noise_of(std::int64_t reading, const Scales& s) const noexcept {
     return s.noise_variance * scatter_[reading] / averaged_[reading];
   }
@@ -164,8 +176,9 @@ class ProcessModel {
   Settings settings_;
   ProcessKernel kernel_;
   std::int64_t count_ = 0, told_ = 0;
-  bool begun_ = false;  // the numbers have been made of readings
-  InputTable points_;   // as the kernel describes them
+  bool begun_ = false;                          // the numbers have been made of readings
+  double within_ = 0.0, within_freedom_ = 0.0;  // variance of the readings of a visit, pooled
+  InputTable points_;                           // as the kernel describes them
   Eigen::VectorXd values_, ages_;
   Eigen::VectorXd scatter_;   // that the variance of each is multiplied by
   Eigen::VectorXd weighed_;   // the same by what the last fit left of each, for the next one

@@ -3,9 +3,10 @@
 // raise the J of the whole map most: the knowledge gradient (Frazier, Powell and Dayanik 2009) summed over the cells,
 // and what less doubt about the limits that hold cells back would free. `ask` gives the input that is worth most at a
 // point that others choose. Nothing is asked far from what was read or from the best of its cell where there are
-// limits, nor where one may break in forty readings by more than the stated probability lets it. With a guide the model
-// is the mean: its factor, its place and what it misses are smooth functions of point and input. ask and tell are
-// noexcept and allocation-free; all randomness is a function of (seed, readings).
+// limits, nor where one may break in forty readings by more than the stated probability lets it. A visit that is odd is
+// made again before it counts. Where no input is known to be safe the map gives the one that most likely is. With a
+// guide the model is the mean, with a factor and a place that are learnt; what it misses is a smooth function of point
+// and input. ask and tell are noexcept and allocation-free; all randomness is a function of (seed, readings).
 #pragma once
 
 #include <array>
@@ -97,8 +98,10 @@ class MapSeeking {
   const Inputs& ask(const Inputs& context) noexcept;
   /// What was best at the point of the last `ask`, as it was known then.
   Inputs estimate() const noexcept { return unscaled(places_.back().best); }
-  /// What was read at an input and a point, or the mean of several readings.
-  TellStatus tell(const Inputs& context, const Inputs& input, const Reading& reading, double readings = 1.0) noexcept;
+  /// What was read at an input and a point, or the mean of several readings, and the standard deviations of these, of
+  /// J and every limit; none, or 0, where they are not known.
+  TellStatus tell(const Inputs& context, const Inputs& input, const Reading& reading, double readings = 1.0,
+                  std::span<const double> sd = {}) noexcept;
   void reseed(std::uint64_t seed) noexcept;
 
   std::size_t cells() const noexcept { return places_.size() - 1; }
@@ -125,6 +128,8 @@ class MapSeeking {
     v("lowest", self.lowest_);
     v("highest", self.highest_);
     v("last_context", self.last_context_);
+    v("last_input", self.last_input_);
+    v("again", self.again_, most_again + 1);
     for (std::size_t c = 0; c < self.places_.size(); ++c) {
       v("place" + std::to_string(c), self.places_[c].from);
     }
@@ -145,14 +150,16 @@ class MapSeeking {
 
  private:
   static constexpr int spread = 20, near = 20, per_place = 1 + spread + near, cloud = 9;
-  static constexpr int most_visits = 8;        // of a cell, that are compared
+  static constexpr int most_visits = 8;  // of a cell, that are compared
+  static constexpr std::int64_t most_again = 2;
+  static constexpr double odd_visit = 12.0;    // squared standard deviations, from which on it is taken again
   static constexpr double given_up = 3.0;      // failures of a cell in a row, then it is left alone
   static constexpr double active_room = 0.02;  // scales of a limit
 
   struct Place {
     Inputs context, best;  // scaled
     Inputs from;           // that its search begins at, so that it is a function of the readings alone
-    double excess = 0.0;   // of the worst limit there, with its probability
+    int known = 0;         // candidate that the map gives
   };
   /// A second difference of the map along an axis that a cell is part of, in ranges of the inputs, the axis counted in
   /// its mean steps: `own` times the input of the cell, plus those of two others.
@@ -176,13 +183,13 @@ class MapSeeking {
   void judge(int points) noexcept;
   bool safe(int point, const Place& place) const noexcept;
   bool known() const noexcept;
-  void scatter(std::span<const Place> places) noexcept;
+  void scatter(std::span<const Place> places, bool sure) noexcept;
   void keep_best(Place& place, int from, int count, bool smooth) noexcept;
   void narrow(std::span<Place> places, bool smooth) noexcept;
   void search(std::span<Place> places) noexcept;
   void know_cells() noexcept;
   void know_edges(std::span<const Place> places) noexcept;
-  void choose_safe(std::span<const Place> places) noexcept;
+  void choose_safe(std::span<Place> places) noexcept;
   int visits_of(std::size_t c, std::span<int> out) const noexcept;
   int least_unsafe(std::span<const Place> places) const noexcept;
   double gain_of(int point) noexcept;
@@ -202,14 +209,16 @@ class MapSeeking {
   std::vector<Place> places_;     // the cells, the last axis fastest, and the point of the last `ask`
   std::vector<double> failures_;  // of the last readings of each cell, in a row
   Inputs lowest_, highest_;       // inputs that were read, scaled
-  Inputs last_context_;
+  Inputs last_context_, last_input_;
+  std::int64_t again_ = 0;                // times in a row that the last reading was odd
   std::vector<std::vector<Bend>> bends_;  // of every cell, where smoothness counts
   bool searched_ = false;                 // what is known of the cells is that of all readings
+  bool suggested_ = false;                // by it, so that looking at the map alone changes nothing
   Visit visit_;
   Inputs asked_;
   // Scratch: of points, then of cells and limits.
   InputTable candidates_;
-  std::vector<double> over_, cautious_, mean_over_, rough_, effect_;
+  std::vector<double> over_, cautious_, mean_over_, odds_, rough_, effect_;
   std::vector<int> safe_, safe_from_;  // candidates that keep the limits, cell by cell
   std::vector<double> multipliers_;
   InputTable edges_, joint_;

@@ -20,7 +20,8 @@ class LimitProcess {
 
   ProcessModel& model() noexcept { return model_; }
   const ProcessModel& model() const noexcept { return model_; }
-  void record(const Inputs& z, double value, const Inputs& about, double readings = 1.0) noexcept;
+  /// `sd`: of the readings that were averaged, as in `ProcessModel::scattered`; 0 where there is none.
+  void record(const Inputs& z, double value, const Inputs& about, double readings = 1.0, double sd = 0.0) noexcept;
 
   /// What the limit would be exceeded by at a point of the last prediction, that many standard deviations above the
   /// mean, in its scale.
