@@ -159,6 +159,8 @@ def _bound(
     if len(given) > len(places):
         named = [argument.name for argument in arguments if argument.keyword_only]
         rest = f"; give {', '.join(named[:3])}{', ...' if len(named) > 3 else ''} by name" if named else ""
+        if not places and isinstance(given[0], str):
+            rest += ", or take a preset: mgdd.presets.available() lists them, mgdd.presets.load(NAME) gives one"
         return TypeError(f"{name}() takes {len(places)} positional arguments, {len(given)} were given{rest}")
     bound = dict(zip(places, given, strict=False))
     names = [argument.name for argument in arguments]

@@ -47,7 +47,7 @@ _ANALYSIS = Options(
 _BRAKE = Options(analyze, "bmep_bar", "brake_torque_nm")
 _CHECKED = Options(check_pressure, "pegging", "pegging_exponent", "inlet_pressure_kpa", "bmep_bar", "brake_torque_nm",
                    n_cylinders="cylinders")  # fmt: skip
-_REFUSED = 2  # exit code where a file is refused
+_FAILED, _REFUSED = 1, 2  # exit codes where a file fails its check, and where it is refused
 # Columns of a record: what stands before and after the name of a figure.
 _COLUMNS = {
     "mean": ("", ""),
@@ -299,6 +299,8 @@ def _check(args: argparse.Namespace) -> None:
             for each in reports
         ],
     }
+    if any(each.verdict == "fail" for each in reports):
+        args.exit_code = _FAILED
     emit(args, payload, text="\n\n".join(each.summary() for each in reports))
 
 

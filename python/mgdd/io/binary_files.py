@@ -30,7 +30,8 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
             "or write it with to_netcdf(path, engine='scipy')"
         )
     if not content.startswith(_CLASSIC):
-        raise DataError(f"{file}: not a netCDF file: it begins with {content[:8]!r}; a text table ends in .csv")
+        hint = "mgdd.maps.read_map reads the grid of a spreadsheet" if file.suffix == ".csv" else "a text table ends in .csv"
+        raise DataError(f"{file}: not a netCDF file: it begins with {content[:8]!r}; {hint}")
     try:
         return xr.load_dataset(io.BytesIO(content), engine="scipy")
     except (ValueError, TypeError, LookupError) as error:  # what scipy makes of missing bytes

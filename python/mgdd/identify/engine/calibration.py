@@ -68,9 +68,13 @@ def compare_laws(
     return fits
 
 
+def _rmse(law: CylinderFit) -> float:
+    return law.report.rmse if law.report.rmse == law.report.rmse else math.inf
+
+
 def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
     """Doubt a fit where the best of the compared laws meets the traces much better; an empty list where none does."""
-    best = min(laws, key=lambda law: law.report.rmse if law.report.rmse == law.report.rmse else float("inf"))
+    best = min(laws, key=_rmse)
     if not best.report.rmse < _MUCH_BETTER * fit.report.rmse:
         return []
     rmse, fit_rmse = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
@@ -179,11 +183,16 @@ class Calibration:
         place = f"{tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"
         lines += ["", f"TDC offset {place}; {tdc.cost}"]
         if self.doubts():
-            lines += ["", "limitations found:", *(f"  - {text}" for text in self.doubts())]
-        lines += ["", "every burn law on the same traces:"]
-        for law in self.laws:
-            lines += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
-            lines += [f"  - {text}" for text in law.findings]
+            named = [f"{name} is not identifiable from these traces" for name in self.unidentifiable()]  # as above
+            lines += ["", "limitations found:", *(f"  - {text}" for text in self.doubts() if text not in named)]
+        form = "  {:28} {:>9} {:>17} {:>10} {:>8}"
+        head = ("law", "RMSE [%]", "closed IMEP [%]", "wall heat", "doubts")
+        lines += ["", "every burn law on the same traces, the nearest first:", form.format(*head)]
+        for law in sorted(self.laws, key=_rmse):
+            off = [load.imep_closed_error_percent for load in law.loads]
+            between = f"{min(off):+.1f} to {max(off):+.1f}"
+            scale = f"{law.model.wall_heat_scale:.2f}"
+            lines.append(form.format(law.kind, f"{100.0 * law.report.rmse:.2f}", between, scale, len(law.findings)))
         return "\n".join(lines)
 
 
