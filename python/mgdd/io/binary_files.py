@@ -30,7 +30,8 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
             "or write it with to_netcdf(path, engine='scipy')"
         )
     if not content.startswith(_CLASSIC):
-        hint = "mgdd.maps.read_map reads the grid of a spreadsheet" if file.suffix == ".csv" else "a text table ends in .csv"
+        table = file.suffix == ".csv"
+        hint = "mgdd.maps.read_map reads the grid of a spreadsheet" if table else "a text table ends in .csv"
         raise DataError(f"{file}: not a netCDF file: it begins with {content[:8]!r}; {hint}")
     try:
         return xr.load_dataset(io.BytesIO(content), engine="scipy")
