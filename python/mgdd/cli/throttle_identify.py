@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import inspect
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd import identify, signals
 from mgdd.cli.from_library import Options, as_option, default_of, shown
 from mgdd.cli.options import option
-from mgdd.cli.output import emit, warn
+from mgdd.cli.output import check_file, emit, warn, wrote
 from mgdd.cli.throttle import LOG, add_throttle, log_in, throttle_of
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify.throttle.excitation import EXCITATIONS
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io.files import write_whole_text
 from mgdd.optimize import FitOptions
+from mgdd.presets.preset import Preset
+from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
 _MODEL = Options(identify.identify_throttle, "model")
 _FIT = Options(identify.identify_throttle, "limp_home_deg", "two_sided", "closed_deg", "open_deg")
 _SEARCH = Options(FitOptions, "seed")
+_MEASURED, _ONE_OF = ("resistance_ohm", "supply_v"), ("inertia_kgm2", "torque_constant_nm_per_a")
+_KNOWN = Options(FirstPrincipleModel.to_throttle, *_ONE_OF)
 _LOG_TITLE = "columns of the log, by name, or by number from 0"
 
 # Searches that ended without a tolerance met, but with a model: stiction makes the last of the cost rough.
@@ -43,6 +49,11 @@ def _add_identify(parser: Any) -> None:
            type=_counts)  # fmt: skip
     _SEARCH.add(parser)
     option(parser, "--figure FILE", "draw the validation (.png, .svg or .pdf)")
+    group = parser.add_argument_group("throttle of the fit")
+    option(group, "--throttle FILE.toml", "also write it as a preset, for --preset of the other commands")
+    option(group, "--resistance-ohm X", "measured at the terminals [ohm]", type=float)
+    option(group, "--supply-v X", "measured at the terminals [V]", type=float)
+    _KNOWN.add(group)
     LOG.add(parser, _LOG_TITLE)
 
 
@@ -65,16 +76,54 @@ def _identify(args: argparse.Namespace) -> None:
     test = None if args.test is None else log_in(args, args.test)
     options = FitOptions(**_SEARCH.given(args))
     given = _MODEL.given(args) | _FIT.given(args)
+    known = _known_of_throttle(args)
     fit = identify.identify_throttle(log, test=test, delay_samples=args.delay_samples, options=options, **given)
     validation = identify.validate_throttle(fit, log if test is None else test)
     emit(args, {**fit.to_dict(), "validation": validation.to_dict()}, text=f"{fit.summary()}\n\n{validation.summary()}",
          write={".toml": lambda file: write_whole_text(file, fit.to_toml())},
          figure=lambda: _drawn(validation, fit.report.to_dataset()))  # fmt: skip
+    if args.throttle:
+        _write_throttle(args, fit.model, known)
     report = fit.report
     if not report.success and report.status not in _ENDED:
         raise ConvergenceError(f"{args.file}: the fit has failed ({report.message}); look at the log, or excite more")
     if report.status == "iteration_limit":
         warn(f"the search {report.message}; the figures hold for what it has found", of=args.file)
+
+
+def _known_of_throttle(args: argparse.Namespace) -> dict[str, float]:
+    check_file("--throttle", args.throttle, (".toml",))
+    known = _KNOWN.given(args) | {name: getattr(args, name) for name in _MEASURED if getattr(args, name) is not None}
+    if args.throttle:
+        missing = [as_option(name) for name in _MEASURED if name not in known]
+        if sum(name in known for name in _ONE_OF) != 1:
+            missing.append(f"one of {' and '.join(map(as_option, _ONE_OF))}")
+        if missing:
+            raise ParameterError(f"--throttle: a log in duty and angle leaves these open: give {', '.join(missing)}")
+        if str(args.model).startswith("pw"):
+            raise ParameterError(f"--throttle: --model {args.model} has no such numbers: leave it out")
+        FirstPrincipleModel().to_throttle(**known)  # what is refused is refused before the search
+    elif known:
+        raise ParameterError(f"{as_option(next(iter(known)))} acts with --throttle FILE.toml only: give it")
+    return known
+
+
+def _write_throttle(args: argparse.Namespace, model: Any, known: dict[str, float]) -> None:
+    if not isinstance(model, FirstPrincipleModel):
+        raise ParameterError(f"--throttle: the model {model.kind} has no such numbers: fit --model first_principle")
+    delay = model.parameters["delay_samples"]
+    if delay >= 0.5:
+        warn(f"the log has a delay of {delay:.2g} samples, a throttle none: track takes --delay-samples", of=args.file)
+    title = f"fitted to {Path(args.file).name}"
+    throttle = model.to_throttle(**known)
+    default = Throttle().to_dict()
+    sources = {
+        f"throttle.{name}": "measured" if name in known else "default" if value == default[name] else title
+        for name, value in throttle.to_dict().items()
+    }
+    preset = Preset(name=Path(args.throttle).stem, title=title, throttle=throttle, sources=sources)
+    write_whole_text(args.throttle, preset.to_toml())
+    wrote(args.throttle)
 
 
 def _validate(args: argparse.Namespace) -> None:

@@ -94,6 +94,10 @@ def _refusal(argument: str, given: Any, needed: str, kind: str) -> ParameterErro
     bound = f"{needed}, a preset, or the name of one: {', '.join(available(kind))}"
     part = getattr(given, argument, None)
     remedy = f"; give its .{argument}" if isinstance(part, Cylinder | Throttle) else ""
+    if kind == "throttle" and hasattr(getattr(given, "model", given), "to_throttle"):
+        own = ".model" if hasattr(given, "model") else ""
+        call = f"{own}.to_throttle(resistance_ohm=..., supply_v=..., torque_constant_nm_per_a=...)"
+        remedy = f"; its {call} is one: what a log in duty and angle leaves open must be stated"
     return ParameterError(
         f"{argument} = {shown(given)}: must be {bound}{remedy}", field=argument, value=given, bound=bound
     )

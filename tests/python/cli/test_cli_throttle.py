@@ -92,6 +92,30 @@ def test_excite_refuses_contradictions(capsys: Capsys, argv: tuple[str, ...], sa
 # --- identify and validate --------------------------------------------------------------------------------------
 
 
+def test_a_log_becomes_a_throttle_that_a_controller_is_tuned_for(
+    capsys: Capsys, tmp_path: Path, files: tuple[str, str]
+) -> None:
+    own = tmp_path / "own.toml"
+    known = ["--resistance-ohm", "1.5", "--supply-v", "12", "--torque-constant-nm-per-a", "0.383"]
+    bare = ["throttle", "identify", files[0]]
+    identify = [*bare, "--model", "first_principle", "--throttle", str(own)]
+    assert "give --resistance-ohm, --supply-v, one of --inertia-kgm2" in refused(capsys, *identify)
+    assert "one of --inertia-kgm2" in refused(capsys, *identify, *known, "--inertia-kgm2", "0.002")
+    assert "resistance_ohm = -1" in refused(capsys, *identify, "--resistance-ohm", "-1", *known[2:])
+    assert "with --throttle FILE.toml" in refused(capsys, *bare, "--supply-v", "12")
+    assert "leave it out" in refused(capsys, *bare, "--model", "pw_r", "--throttle", str(own), *known)
+    assert not own.exists()
+    run_json(capsys, *identify, *known)
+    preset = presets.load(own)
+    assert preset.throttle.inertia_kgm2 == pytest.approx(0.0021, rel=0.1)
+    assert preset.sources["throttle.resistance_ohm"] == "measured"
+    assert preset.sources["throttle.coulomb_nm"].startswith("fitted to ")
+    assert preset.sources["throttle.bore_mm"] == "default"
+    track = ["throttle", "track", "--controller", "guided", "--reference", "step:20:60"]
+    found, true = (run_json(capsys, *track, "--preset", name) for name in (str(own), "P1"))
+    assert found["settling_ms"] == pytest.approx(true["settling_ms"], rel=0.15)
+
+
 @pytest.mark.parametrize("model", KINDS)
 def test_identify_then_validate(capsys: Capsys, tmp_path: Path, files: tuple[str, str], model: str) -> None:
     train, test = files

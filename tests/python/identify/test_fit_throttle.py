@@ -15,8 +15,10 @@ from mgdd.identify.throttle.first_principle_problem import regression_start
 from mgdd.identify.throttle.nuisances import TYPICAL_SHARE, delay_weights
 from mgdd.identify.throttle.whole_delay import FINE
 from mgdd.io import throttle_log
+from mgdd.loop import track, tuned_controller
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import Model
+from mgdd.throttle import simulate_throttle
 
 TRUTH = {
     "tau_s": 0.0197,
@@ -101,23 +103,55 @@ def test_a_two_sided_log_with_noise_gives_both_sides():
     assert FirstPrincipleModel.from_toml(fit.to_toml()) == fit.model
 
 
-def test_physical_numbers_come_back_from_either_known_number():
+def test_the_throttle_of_a_model_has_its_numbers_from_either_known_one():
     model = FirstPrincipleModel(parameters=TRUTH, substeps=4)
-    one = model.physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
-    # A passenger-car throttle with 0.383 N m/A, 0.0088 N m s/rad, 0.087 N m/rad, 0.396 and 0.284 N m.
-    assert one["torque_constant_nm_per_a"] == pytest.approx(0.383, rel=2e-3)
-    assert one["viscous_nms_per_rad"] == pytest.approx(0.0088, rel=0.05)
-    assert one["spring_above_nm_per_rad"] == pytest.approx(0.087, rel=5e-3)
-    assert one["preload_above_nm"] == pytest.approx(0.396, rel=5e-3)
-    assert one["coulomb_nm"] == pytest.approx(0.284, rel=5e-3)
-    other = model.physical_parameters(
-        resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=one["torque_constant_nm_per_a"]
+    one = model.to_throttle(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
+    # A passenger-car throttle with 0.383 N m/A, 0.087 N m/rad, 0.396 and 0.284 N m.
+    assert one.torque_constant_nm_per_a == pytest.approx(0.383, rel=2e-3)
+    assert one.spring_above_nm_per_rad == pytest.approx(0.087, rel=5e-3)
+    assert one.preload_above_nm == pytest.approx(0.396, rel=5e-3)
+    assert one.coulomb_nm == pytest.approx(0.284, rel=5e-3)
+    other = model.to_throttle(resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=one.torque_constant_nm_per_a)
+    numbers, others = one.to_dict(), other.to_dict()
+    assert {name: others[name] for name in others if isinstance(others[name], float)} == pytest.approx(
+        {name: numbers[name] for name in numbers if isinstance(numbers[name], float)}
     )
-    assert other == pytest.approx(one)
     with pytest.raises(ParameterError, match="exactly one"):
-        model.physical_parameters(resistance_ohm=1.5, supply_v=12.0)
+        model.to_throttle(resistance_ohm=1.5, supply_v=12.0)
     with pytest.raises(ParameterError, match="resistance_ohm"):
-        model.physical_parameters(resistance_ohm=-1.0, supply_v=12.0, inertia_kgm2=0.002)
+        model.to_throttle(resistance_ohm=-1.0, supply_v=12.0, inertia_kgm2=0.002)
+
+
+@pytest.mark.parametrize(
+    ("groups", "least"),
+    [
+        ({}, 99.5),
+        ({"limp_home_deg": 15.0, "beta_above_duty": 0.06, "tau_s": 0.08, "gain_deg_per_s2_per_duty": 2e4}, 98.0),
+        ({"electrical_s": 0.002, "viscous_share": 0.3}, 99.5),
+        ({"stribeck_drop": 0.4, "stribeck_deg_per_s": 20.0}, 99.5),
+        ({"presliding_deg": 0.3}, 99.0),
+        ({"stop_duty_per_deg": 20.0, "stop_damping": 0.6}, 99.5),
+        ({"tau_s": 0.25, "gain_deg_per_s2_per_duty": 1e4}, 97.0),
+        ({"half_gap_deg": 0.5}, 94.0),
+    ],
+)
+def test_the_throttle_of_a_model_moves_as_it_does(groups, least):
+    model = FirstPrincipleModel(parameters={**TYPICAL, **groups}, substeps=4)
+    duty = np.repeat(np.random.default_rng(3).uniform(-0.35, 0.55, 40), 200)
+    angle = model.simulate({"time_s": 1e-3 * np.arange(duty.size), "duty": duty})["angle_deg"].to_numpy()
+    throttle = model.to_throttle(resistance_ohm=1.2, supply_v=13.0, torque_constant_nm_per_a=0.5)
+    own = simulate_throttle(throttle, duty, sample_s=1e-3)["angle_deg"].to_numpy()
+    assert 100.0 * (1.0 - np.linalg.norm(own - angle) / np.linalg.norm(angle - angle.mean())) > least
+
+
+def test_a_model_is_no_throttle_until_the_rest_is_known():
+    fit = fit_plain(two_sided_log())
+    for given in (fit, fit.model):
+        with pytest.raises(ParameterError, match=r"\.to_throttle\(resistance_ohm="):
+            simulate_throttle(given, [0.1, 0.2])
+    throttle = fit.model.to_throttle(resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=0.383)
+    run = track(tuned_controller("guided", throttle), np.repeat([20.0, 60.0], 500), throttle=throttle)
+    assert abs(float(run["angle_deg"][-1]) - 60.0) < 0.5
 
 
 def test_wrong_calls_name_the_remedy_and_a_right_one_follows():

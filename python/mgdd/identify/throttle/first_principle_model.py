@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mgdd import _core
+from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
 from mgdd.io.parameters import ModelParameters, Wanted, wanted
 from mgdd.results.describe import described
@@ -40,6 +42,7 @@ TYPICAL = MappingProxyType(
 )
 _POSITIVE = ("tau_s", "gain_deg_per_s2_per_duty", "stribeck_deg_per_s", "ramp_deg")
 LONGEST_DELAY = 20.0
+_RIGID_DUTY_PER_DEG = 200.0  # of a stop that yields too little to be seen
 _CORE_DELAY = 5.0  # of a model of the core, whose delay line is part of its state
 
 
@@ -132,15 +135,20 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             substeps=self.substeps,
         )
 
-    def physical_parameters(
+    def to_throttle(
         self,
         *,
         resistance_ohm: float,
         supply_v: float,
         inertia_kgm2: float | None = None,
         torque_constant_nm_per_a: float | None = None,
-    ) -> dict[str, float]:
-        """Compute physical numbers back from groups: g = K V/R and G = g/J leave one number to be known.
+    ) -> Throttle:
+        """Compute the throttle with these groups: g = K V/R and G = g/J leave one number to be known.
+
+        It moves as the model does; nothing is that of a preset. What a log in duty and angle cannot show follows from
+        the groups: of the damping the share that is not back-EMF is viscous, rigid stops yield by 0.005° under the
+        stall torque and do not rebound, a gap has a seventh of the inertia on the side of the plate. A delay is none of
+        a throttle: give `delay_samples` to `mgdd.loop.track`.
 
         Parameters
         ----------
@@ -151,14 +159,20 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
 
         Returns
         -------
-        dict of str to float
-            Inertia, torque constant, viscous friction (without back-EMF), springs, preloads and Coulomb friction, all
-            at the plate shaft.
+        mgdd.throttle.Throttle
+            All at the plate shaft; friction Coulomb, Stribeck or LuGre as the groups have it.
 
         Raises
         ------
         ParameterError
             A number that is not positive, or none or both of the two.
+
+        Examples
+        --------
+        >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+        >>> throttle = FirstPrincipleModel().to_throttle(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
+        >>> round(throttle.torque_constant_nm_per_a, 3), throttle.limp_home_deg
+        (0.229, 8.0)
         """
         numbers = {
             "resistance_ohm": resistance_ohm,
@@ -170,21 +184,48 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             ParameterError.unless(value is None or (math.isfinite(value) and value > 0.0), name, value, "> 0")
         if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
             raise ParameterError("inertia_kgm2, torque_constant_nm_per_a: give exactly one of them")
-        p = self.parameters
-        gain = math.radians(p["gain_deg_per_s2_per_duty"])
+        p, per_rad = self.parameters, math.degrees(1.0)
+        gain = p["gain_deg_per_s2_per_duty"] / per_rad
         if torque_constant_nm_per_a is not None:
             stall = torque_constant_nm_per_a * supply_v / resistance_ohm
         else:
             stall = gain * float(inertia_kgm2 or math.nan)
-        inertia = stall / gain
-        constant = stall * resistance_ohm / supply_v
-        return {
-            "inertia_kgm2": inertia,
-            "torque_constant_nm_per_a": constant,
-            "viscous_nms_per_rad": inertia / p["tau_s"] - constant**2 / resistance_ohm,
-            "spring_above_nm_per_rad": math.degrees(p["kappa_above_duty_per_deg"]) * stall,
-            "spring_below_nm_per_rad": math.degrees(p["kappa_below_duty_per_deg"]) * stall,
-            "preload_above_nm": p["beta_above_duty"] * stall,
-            "preload_below_nm": p["beta_below_duty"] * stall,
-            "coulomb_nm": p["delta_duty"] * stall,
+        inertia, constant = stall / gain, stall * resistance_ohm / supply_v
+        damping, coulomb = inertia / p["tau_s"], p["delta_duty"] * stall
+        rigid = p["stop_duty_per_deg"] == 0.0
+        stop = (_RIGID_DUTY_PER_DEG if rigid else p["stop_duty_per_deg"]) * per_rad * stall
+        given: dict[str, Any] = {
+            "friction": "stribeck" if p["stribeck_drop"] > 0.0 and coulomb > 0.0 else "coulomb",
+            "backlash": "none",
         }
+        if p["presliding_deg"] > 0.0 and coulomb > 0.0:
+            bristle = coulomb * per_rad / p["presliding_deg"]
+            given["friction"] = "lugre"
+            given["bristle_nm_per_rad"] = bristle
+            given["bristle_damping_nms_per_rad"] = 2.0 * p["presliding_damping"] * math.sqrt(bristle * inertia)
+        if p["half_gap_deg"] > 0.0:
+            given |= {"backlash": "compliance", "backlash_half_deg": p["half_gap_deg"]}
+        return Throttle(
+            inertia_kgm2=inertia,
+            torque_constant_nm_per_a=constant,
+            viscous_nms_per_rad=p["viscous_share"] * damping,
+            back_emf_vs_per_rad=(1.0 - p["viscous_share"]) * damping * resistance_ohm / constant,
+            resistance_ohm=resistance_ohm,
+            inductance_mh=1e3 * p["electrical_s"] * resistance_ohm,
+            supply_v=supply_v,
+            coulomb_nm=coulomb,
+            stiction_nm=(1.0 + p["stribeck_drop"]) * coulomb,
+            stribeck_rad_per_s=p["stribeck_deg_per_s"] / per_rad,
+            limp_home_deg=p["limp_home_deg"],
+            spring_above_nm_per_rad=p["kappa_above_duty_per_deg"] * per_rad * stall,
+            spring_below_nm_per_rad=p["kappa_below_duty_per_deg"] * per_rad * stall,
+            preload_above_nm=p["beta_above_duty"] * stall,
+            preload_below_nm=p["beta_below_duty"] * stall,
+            preload_ramp_deg=p["ramp_deg"],
+            closed_deg=self.closed_deg,
+            open_deg=self.open_deg,
+            stop_stiffness_nm_per_rad=stop,
+            stop_damping_nms_per_rad=2.0 * (1.0 if rigid else p["stop_damping"]) * math.sqrt(stop * inertia),
+            plate_inertia_kgm2=inertia / 7.0,
+            **given,
+        )
