@@ -157,7 +157,8 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     put(0, scaled_context(last_context_), scaled(last_input_));
     j_.predict(candidates_, 1);
     searched_ = false;
-    visit_ = {last_context_, last_input_, 0.0, j_.sd(0)};
+    const Inputs within = last_input_.cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
+    visit_ = {last_context_, within, 0.0, j_.sd(0)};
     return visit_;
   }
   double most = -1.0;
