@@ -152,6 +152,9 @@ def _split(text: str) -> list[str]:
     return [*parts, text[start:].strip()] if text[start:].strip() else parts
 
 
+_OF_PRESETS = ("Cylinder", "OperatingPoint", "Throttle")  # what a preset holds
+
+
 def _bound(
     name: str, arguments: list[_Argument], given: Sequence[Any], keywords: Mapping[str, Any]
 ) -> dict[str, Any] | TypeError:
@@ -159,7 +162,7 @@ def _bound(
     if len(given) > len(places):
         named = [argument.name for argument in arguments if argument.keyword_only]
         rest = f"; give {', '.join(named[:3])}{', ...' if len(named) > 3 else ''} by name" if named else ""
-        if not places and isinstance(given[0], str):
+        if name in _OF_PRESETS and isinstance(given[0], str):
             rest += ", or take a preset: mgdd.presets.available() lists them, mgdd.presets.load(NAME) gives one"
         return TypeError(f"{name}() takes {len(places)} positional arguments, {len(given)} were given{rest}")
     bound = dict(zip(places, given, strict=False))

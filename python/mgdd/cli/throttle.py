@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from mgdd.errors import DataError, ParameterError, argument, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.table import Place, read_table
+from mgdd.loop.plates import model_of
 from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
 from mgdd.presets.preset import Preset
@@ -35,7 +37,7 @@ LOG = Options(
     "travel_deg", "start_s", "stop_s", "sample_s", "delimiter", "decimal", "sheet",
 )  # fmt: skip
 
-_DEFAULT_PRESET = "P1"
+DEFAULT_PRESET = "P1"
 
 
 def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
@@ -45,7 +47,7 @@ def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
 
 def add_preset(group: Any) -> None:
     """Add the preset of a throttle."""
-    what = f"{', '.join(presets.available('throttle'))} or a TOML file (default: {_DEFAULT_PRESET})"
+    what = f"{', '.join(presets.available('throttle'))}, a TOML file of one, or of a fit (default: {DEFAULT_PRESET})"
     option(group, "--preset NAME_OR_FILE.toml", what)
 
 
@@ -58,7 +60,7 @@ def add_throttle(parser: argparse.ArgumentParser) -> None:
 
 def preset_of(args: argparse.Namespace) -> Preset:
     """Load the preset of a throttle; it refuses to be an engine when it is asked for its throttle."""
-    return presets.load(args.preset or _DEFAULT_PRESET)
+    return presets.load(args.preset or DEFAULT_PRESET)
 
 
 def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
@@ -126,7 +128,13 @@ def _add_simulate(parser: Any) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
-    throttle, preset = throttle_of(args)
+    meant = model_of(args.preset or DEFAULT_PRESET)
+    if isinstance(meant, Throttle):
+        meant, preset = throttle_of(args)
+    elif args.set:
+        raise ParameterError.of("--set", args.set, "left out with a fit: it goes with a preset")
+    else:
+        preset = Path(args.preset).stem
     timed, signals = _TIME.given(args), _SIGNALS.given(args)
     if args.input is None:
         given = {"duty": args.duty, **timed, **signals}
@@ -134,17 +142,18 @@ def _simulate(args: argparse.Namespace) -> None:
         raise ParameterError(f"{as_option(next(iter(timed)))} goes with --duty: the times of --input are its own")
     else:
         given = read_duty(args.input, signals)
-    run = simulate_throttle(throttle, **given, **_RUN.given(args))
+    run = simulate_throttle(meant, **given, **_RUN.given(args))
+    physical = isinstance(meant, Throttle)
     payload = {
         "preset": preset,
         "duty": args.duty,
         "bridge": _RUN.of(args)["bridge"],
         **step_summary(run),
-        "max_current_a": float(np.abs(run["current_a"]).max()),
+        **({"max_current_a": float(np.abs(run["current_a"]).max())} if physical else {}),
         "duration_s": float(run["time_s"][-1] - run["time_s"][0]),
         "samples": run.sizes["time_s"],
-        "step_s": _RUN.of(args)["step_s"],
-        "parameters": throttle.to_dict(),
+        **({"step_s": _RUN.of(args)["step_s"]} if physical else {}),
+        "parameters": meant.to_dict() if isinstance(meant, Throttle) else dict(meant.parameters),
     }
     emit(args, payload, traces=run, figure=partial(drawn, throttle_run, run, size=(7.0, 5.4)))
 

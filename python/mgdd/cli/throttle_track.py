@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from mgdd import presets
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import option
 from mgdd.cli.output import emit, warn
 from mgdd.cli.ranges import number_pairs
-from mgdd.cli.throttle import add_preset, add_throttle, known_only, preset_of, throttle_of
+from mgdd.cli.throttle import DEFAULT_PRESET, add_preset, add_throttle, changes_of, known_only
+from mgdd.errors import ParameterError
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
+from mgdd.loop.plates import Plate, plate_of
 from mgdd.loop.track import FIGURES, step_times_us
 from mgdd.loop.tune import with_stiction
 from mgdd.loop.tuned import tuned_with_doubts
@@ -54,19 +59,22 @@ def _add_controller(parser: argparse.ArgumentParser) -> None:
 
 
 def _track(args: argparse.Namespace) -> None:
-    preset = preset_of(args)
-    known = preset.throttle
+    plate, preset = _plate_in(args)
     numbers = [name for name, field in Throttle.fields().items() if "choices" not in field]
     scales = with_stiction(known_only(number_pairs(args.plant_scale, "--plant-scale"), numbers, "--plant-scale"))
-    plant = known.replace(**{name: getattr(known, name) * factor for name, factor in scales.items()})
-    model: Any = known if args.model is None else load_throttle_model(args.model)
+    known = plate.plant
+    if scales and not isinstance(known, Throttle):
+        raise ParameterError.of("--plant-scale", args.plant_scale, "left out: a pseudo-Wiener fit has no such fields")
+    changes = {name: getattr(known, name) * factor for name, factor in scales.items()}
+    plant: Any = replace(plate, plant=known.replace(**changes)) if isinstance(known, Throttle) else plate
+    model: Any = plate if args.model is None else load_throttle_model(args.model)
     reference = Reference.parse(args.reference)
     how = _RUN.of(args)
     controller, doubts = tuned_with_doubts(
         args.controller,
         model,
         sample_s=reference.sample_s,
-        delay_samples=None if args.model is not None else how["delay_samples"],
+        delay_samples=None if args.model is not None else plate.delay_samples(how["delay_samples"], reference.sample_s),
         noise_deg=how["noise_deg"],
     )
     warn(*doubts)
@@ -75,7 +83,7 @@ def _track(args: argparse.Namespace) -> None:
     payload = {
         "controller": args.controller,
         "reference": reference.name,
-        "preset": preset.name,
+        "preset": preset,
         "plant_scale": scales,
         "seed": how["seed"],
         **{name: float(run[name]) for name in FIGURES},
@@ -89,8 +97,12 @@ def _track(args: argparse.Namespace) -> None:
 
 
 def _tune(args: argparse.Namespace) -> None:
-    throttle, preset = throttle_of(args)
-    found = tune_controller(args.controller, throttle, **_TUNE.given(args))
+    plate, preset = _plate_in(args)
+    changes = changes_of(args, Throttle.fields())
+    if changes and (plate.model is not None or not isinstance(plate.plant, Throttle)):
+        raise ParameterError.of("--set", args.set, "left out with a fit: it goes with a preset")
+    plant: Any = plate.plant.replace(**changes) if changes and isinstance(plate.plant, Throttle) else plate
+    found = tune_controller(args.controller, plant, **_TUNE.given(args))
     payload = {
         "controller": found.kind,
         "preset": preset,
@@ -100,18 +112,24 @@ def _tune(args: argparse.Namespace) -> None:
         "numbers": dict(found.numbers),
         **found.settings,
     }
-    settings = _TUNE.of(args)
     said = (
         f"{FAMILIES[found.kind].label} for throttles around {preset}: cost {found.start_cost:.3f} -> {found.cost:.3f} "
-        f"in {found.evaluations} runs of {settings['n_throttles']} throttles\n"
+        f"in {found.evaluations} runs of {found.settings['n_throttles']} throttles\n"
     )
-    delay = f"delay_samples={settings['delay_samples']}"
+    delay = f"delay_samples={found.settings['delay_samples']}"
     text: list[str | Table] = [
         said,
         Table(columns=("number", "tuned"), rows=tuple((name, f"{value:g}") for name, value in found.numbers.items())),
         f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, {delay})",
     ]
     emit(args, payload, text=text)
+
+
+def _plate_in(args: argparse.Namespace) -> tuple[Plate, str]:
+    """Load the plant that ``--preset`` names: a preset, or a fit of `mgdd throttle identify`."""
+    given = args.preset or DEFAULT_PRESET
+    plate = plate_of(given)
+    return plate, Path(given).stem if plate.model is not None else presets.load(given).name
 
 
 COMMANDS = {"track": (_add_track, _track), "tune": (_add_tune, _tune)}

@@ -10,7 +10,7 @@ from typing import Any
 from mgdd._core.control import Plate
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import ParameterError
-from mgdd.presets.meant import throttle_model_of
+from mgdd.loop.plates import model_of
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 
 Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
@@ -47,7 +47,7 @@ def groups_of(model: Any) -> Groups:
 
     ParameterError for anything else.
     """
-    model = throttle_model_of(model)
+    model = model_of(model)
     if hasattr(model, "stall_torque_nm"):
         return Groups(model.plate)
     numbers = getattr(model, "parameters", None)

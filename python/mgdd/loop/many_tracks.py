@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import copy
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError
+from mgdd.loop.plates import PlateLike, plate_of
 from mgdd.loop.reference import Reference
-from mgdd.loop.track import FIGURES, AngleController, column_of, core_of, plant_of, reference_of, sensors_of
+from mgdd.loop.track import FIGURES, AngleController, column_of, core_of, plant_of, reference_of, sensors_of, track
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import threads_of
-from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
+from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,9 +27,9 @@ if TYPE_CHECKING:
 def track_many(
     controllers: Mapping[str, AngleController],
     references: Sequence[Reference | str],
-    throttles: Sequence[ThrottleLike],
+    throttles: Sequence[PlateLike],
     *,
-    delay_samples: int = 1,
+    delay_samples: int | None = None,
     airflow_torque_nm: Mapping[str, ArrayLike] | None = None,
     noise_deg: float = 0.03,
     first_seed: int = 0,
@@ -42,10 +45,11 @@ def track_many(
         Controllers of `mgdd.control` by name; each run starts from a copy.
     references : sequence of Reference or str
         As for `track`, all with the same sample time.
-    throttles : sequence of Throttle, Preset, str or path-like
-        The plants; the noise of number i has the seed ``first_seed + i`` in every run.
+    throttles : sequence of Throttle, Preset, Fit, its model, str or path-like, or objects with `step` and `output`
+        The plants; the noise of number i has the seed ``first_seed + i`` in every run. A plant of your own is copied
+        for every run, which then is one of `track`, in turn.
     delay_samples, noise_deg : int, float
-        As for `track`.
+        As for `track`; left out, the delay of the first plant.
     airflow_torque_nm : mapping of str to array_like, optional
         Torque on the plate [N m] by the name of the reference, one number or one per sample.
     first_seed : int
@@ -90,13 +94,18 @@ def track_many(
     if unknown:
         raise ParameterError.of("airflow_torque_nm", sorted(unknown), "names of references")
     airflow = [column_of("airflow_torque_nm", flows.get(r.name), len(r.angle_deg)) for r in all_references]
-    sensors = sensors_of(noise_deg)
-    plants = [
-        plant_of(throttle_of(each), all_references[0], None, sensors, first_seed + number)
-        for number, each in enumerate(throttles)
-    ]
+    plates = [plate_of(each) for each in throttles]
+    delay_samples = plates[0].delay_samples(delay_samples, all_references[0].sample_s)
+    for plate in plates:
+        plate.require_torques(airflow_torque_nm=airflow_torque_nm)
 
     def run() -> Any:
+        sensors = sensors_of(noise_deg)
+        plants = [
+            plant_of(plate.plant, all_references[0], None, sensors, first_seed + number)
+            for number, plate in enumerate(plates)
+            if isinstance(plate.plant, Throttle)
+        ]
         return _core.loop.track_throttles(
             plants,
             [core_of(controller) for controller in controllers.values()],
@@ -106,7 +115,30 @@ def track_many(
             threads=threads_of(workers),
         )
 
-    (figures, finished), stop = or_partial(run)
+    def in_turn() -> Any:
+        rows = {name: np.full(len(plates) * len(controllers) * len(all_references), np.nan) for name in FIGURES}
+        finished = np.zeros(len(rows[FIGURES[0]]), bool)
+        runs = itertools.product(range(len(plates)), controllers.values(), range(len(all_references)))
+        try:
+            for at, (plant, controller, reference) in enumerate(runs):
+                one = track(
+                    copy.deepcopy(controller),
+                    all_references[reference],
+                    throttle=copy.deepcopy(throttles[plant]),
+                    delay_samples=delay_samples,
+                    airflow_torque_nm=flows.get(all_references[reference].name),
+                    noise_deg=noise_deg,
+                    seed=first_seed + plant,
+                )
+                finished[at] = True
+                for name in FIGURES:
+                    rows[name][at] = float(one[name])
+        except KeyboardInterrupt:
+            return (rows, finished), Interrupted("interrupted: the runs until then are in .partial")
+        return (rows, finished), None
+
+    in_core = all(isinstance(plate.plant, Throttle) for plate in plates)
+    (figures, finished), stop = or_partial(run) if in_core else in_turn()
     shape = len(throttles), len(controllers), len(all_references)
     finished = np.asarray(finished).reshape(shape)
     dims = ("throttle", "controller", "reference")

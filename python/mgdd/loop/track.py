@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -9,9 +12,9 @@ import numpy as np
 from mgdd import _core
 from mgdd._arguments import require_plain
 from mgdd.errors import ParameterError
+from mgdd.loop.plates import Plate, PlateLike, PlatePlant, plate_of
 from mgdd.loop.reference import Reference
 from mgdd.loop.virtual_throttle import VirtualThrottle
-from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of, is_timed
@@ -60,8 +63,8 @@ def track(
     controller: AngleController,
     reference: Any,
     *,
-    throttle: ThrottleLike | None = None,
-    delay_samples: int = 1,
+    throttle: PlateLike | None = None,
+    delay_samples: int | None = None,
     airflow_torque_nm: ArrayLike | None = None,
     supply_v: ArrayLike | None = None,
     start_deg: float | None = None,
@@ -79,18 +82,22 @@ def track(
     reference : Reference, str, array_like, shape (n,), or a signal with its time
         What to follow: a `Reference`, what `Reference.parse` reads, angles [deg] 1 ms apart, or a Dataset, DataFrame,
         mapping, DataArray or Series with ``reference_deg`` over ``time_s``.
-    throttle : Throttle, Preset, str or path-like, optional
-        The plant; the preset ``P1`` if left out.
-    delay_samples : int
-        Whole samples between the computed duty and its effect, 0 to 20.
+    throttle : Throttle, Preset, Fit, its model, str or path-like, or an object with `step` and `output`, optional
+        The plant; the preset ``P1`` if left out. A fit, its model or its TOML file moves as the log did. A plant of
+        your own has ``step(duty)``, which lets a duty act for one sample, and ``output``, the angle now [deg]; it goes
+        on from its present state and is left in the state after the run.
+    delay_samples : int, optional
+        Whole samples between the computed duty and its effect, 0 to 20; the delay of a fit, to the nearest sample, or
+        1 if left out.
     airflow_torque_nm, supply_v : array_like, shape (n,), optional
-        Torque on the plate [N m], positive when it opens, and supply of the bridge [V]; one number acts all the time.
+        Torque on the plate of a throttle [N m], positive when it opens, and supply of its bridge [V]; one number acts
+        all the time.
     start_deg : float, optional
         Angle at rest at the start [deg]; the first angle of the reference, inside the travel, if left out.
     noise_deg : float
         Standard deviation of the measured angle [deg]; not used where `sensors` are given.
     sensors : SensorPair, optional
-        The position sensors.
+        The position sensors of a throttle.
     seed : int
         Of the noise.
 
@@ -98,7 +105,8 @@ def track(
     -------
     xarray.Dataset
         Over ``time_s``: ``reference_deg``, ``angle_deg`` (true, at the end of the sample), ``sensed_angle_deg``,
-        ``speed_deg_per_s``, ``current_a`` and ``duty`` [-]. Scalars, judged from ``reference.from_s`` on:
+        ``duty`` [-], of a throttle or a first-principle fit ``speed_deg_per_s``, and of a throttle ``current_a``.
+        Scalars, judged from ``reference.from_s`` on:
         ``settling_ms`` (until the error stays in the band; NaN: never), ``mse_deg2``, ``static_error_deg`` (mean size
         over the last 0.1 s), ``overshoot_deg``, ``total_variation`` of the duty [-], ``limit_cycle_deg`` (peak to peak
         over the last 0.3 s of a reference that stands still) and ``largest_error_deg``.
@@ -118,44 +126,51 @@ def track(
     >>> float(run["settling_ms"]) < 30.0, run["settling_ms"].units
     (True, 'ms')
     """
-    target = reference_of(reference)
-    plant = plant_of(throttle, target, start_deg, sensors or sensors_of(noise_deg), seed)
-    n = len(target.angle_deg)
+    target, plate = reference_of(reference), plate_of(throttle)
+    plate.require_torques(airflow_torque_nm=airflow_torque_nm, supply_v=supply_v)
+    delay_samples = plate.delay_samples(delay_samples, target.sample_s)
+    n, inner = len(target.angle_deg), core_of(controller)
     airflow, supply = column_of("airflow_torque_nm", airflow_torque_nm, n), column_of("supply_v", supply_v, n)
-    inner = core_of(controller)
-    if inner is not None:
-        run = _core.loop.track_throttle(
-            inner,
-            plant,
-            delay_samples=delay_samples,
-            reference_deg=target.angle_deg,
-            airflow_torque_nm=airflow,
-            supply_v=supply,
-            from_sample=target.from_sample,
-            band_deg=target.band_deg,
-        )
-        figures = {name: float(column[0]) for name, column in run.pop("figures").items()}
-    elif callable(getattr(controller, "step", None)):
-        run = _run_in_python(controller, plant, target.angle_deg, delay_samples, airflow, supply)
-        figures = _core.loop.tracking_figures(
-            reference_deg=target.angle_deg,
-            angle_deg=run["angle_deg"],
-            duty=run["duty"],
-            sample_s=target.sample_s,
-            from_sample=target.from_sample,
-            band_deg=target.band_deg,
-        )
-    else:
+    if inner is None and not callable(getattr(controller, "step", None)):
         raise ParameterError.of(
             "controller", controller, "an object with step(reference_deg, measurement_deg); "
             "tuned_controller('guided', model) makes one for a throttle, a preset or a fit"
         )  # fmt: skip
+    ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
+    if not isinstance(plate.plant, Throttle):
+        own = _OwnPlate(plate, target, start_deg, noise_deg, sensors, seed)
+        run = _run_in_python(controller, own, target.angle_deg, delay_samples, airflow, supply)
+    else:
+        plant = plant_of(plate.plant, target, start_deg, sensors or sensors_of(noise_deg), seed)
+        if inner is None:
+            run = _run_in_python(controller, plant, target.angle_deg, delay_samples, airflow, supply)
+        else:
+            run = _core.loop.track_throttle(
+                inner,
+                plant,
+                delay_samples=delay_samples,
+                reference_deg=target.angle_deg,
+                airflow_torque_nm=airflow,
+                supply_v=supply,
+                from_sample=target.from_sample,
+                band_deg=target.band_deg,
+            )
+    figures = run.pop("figures", None) or _core.loop.tracking_figures(
+        reference_deg=target.angle_deg,
+        angle_deg=run["angle_deg"],
+        duty=run["duty"],
+        sample_s=target.sample_s,
+        from_sample=target.from_sample,
+        band_deg=target.band_deg,
+    )
+    if plate.model is not None:
+        run.pop("current_a", None)
     variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", np.arange(n) * target.sample_s)}
     variables["reference_deg"] = ("time_s", target.angle_deg)
     for name, column in run.items():
         variables[name] = ("time_s", column)
     for name in FIGURES:
-        variables[name] = ((), float(figures[name]))
+        variables[name] = ((), float(np.ravel(figures[name])[0]))
     for name, column in (("airflow_torque_nm", airflow), ("supply_v", supply)):
         if len(column):
             variables[name] = ("time_s", column)
@@ -187,10 +202,9 @@ def reference_of(given: Any) -> Reference:
 
 
 def plant_of(
-    throttle: ThrottleLike | None, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
+    body: Throttle, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
 ) -> VirtualThrottle:
     """Give the plant at rest at the first angle of the reference, inside its travel, by default."""
-    body = Throttle() if throttle is None else throttle_of(throttle)
     start = float(np.clip(reference.angle_deg[0], body.closed_deg, body.open_deg)) if start_deg is None else start_deg
     return VirtualThrottle(body, sensors=sensors, start_deg=start, sample_s=reference.sample_s, seed=seed)
 
@@ -206,28 +220,67 @@ def column_of(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]
     return np.full(n, float(column)) if column.ndim == 0 else column
 
 
+class _OwnPlate:
+    """A plant that is no throttle, with white noise on its angle."""
+
+    _still: Mapping[str, float] = MappingProxyType({"supply_v": math.nan})
+
+    def __init__(
+        self,
+        plate: Plate,
+        reference: Reference,
+        start_deg: float | None,
+        noise_deg: float,
+        sensors: SensorPair | None,
+        seed: int,
+    ) -> None:
+        sensors_of(noise_deg)  # refuses it alike
+        if sensors is not None:
+            raise ParameterError.of("sensors", sensors, "left out where the plant is not a throttle: give noise_deg")
+        if start_deg is not None and plate.model is None:
+            raise ParameterError.of("start_deg", start_deg, "left out: a plant of your own starts where it is")
+        first = float(reference.angle_deg[0])
+        self._plant: PlatePlant = plate.moving(reference.sample_s, first if start_deg is None else start_deg)
+        self.start_deg = self._angle()
+        self._noise, self._rng = noise_deg, np.random.default_rng(seed)
+
+    def _angle(self) -> float:
+        given = self._plant.output
+        try:
+            angle = float(given() if callable(given) else given)
+        except TypeError:
+            raise ParameterError.of("output of the plant", given, "one number, the angle now [deg]") from None
+        ParameterError.unless(math.isfinite(angle), "output of the plant", angle, "a finite angle [deg]")
+        return angle
+
+    def step(self, *, duty: float, **_none: float) -> dict[str, float]:
+        self._plant.step(float(np.clip(duty, -1.0, 1.0)))
+        angle = self._angle()
+        return {"angle_deg": angle, "sensed_angle_deg": angle + self._noise * float(self._rng.standard_normal())}
+
+
 def _run_in_python(
     controller: AngleController,
-    plant: VirtualThrottle,
+    plant: VirtualThrottle | _OwnPlate,
     reference_deg: NDArray[np.float64],
     delay_samples: int,
     airflow: NDArray[np.float64],
     supply: NDArray[np.float64],
-) -> dict[str, NDArray[np.float64]]:
-    ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
-    names = ("angle_deg", "sensed_angle_deg", "speed_deg_per_s", "current_a", "duty")
-    out = {name: np.empty(len(reference_deg)) for name in names}
+) -> dict[str, Any]:
+    names = ("angle_deg", "sensed_angle_deg", "speed_deg_per_s", "current_a")
+    rows: list[dict[str, float]] = []
+    duty = np.empty(len(reference_deg))
     still = plant._still
     measured = plant.start_deg
     for k, target_deg in enumerate(reference_deg):
-        out["duty"][k] = controller.step(float(target_deg), measured)
+        duty[k] = controller.step(float(target_deg), measured)
         values = plant.step(
-            duty=out["duty"][k - delay_samples] if k >= delay_samples else 0.0,
+            duty=duty[k - delay_samples] if k >= delay_samples else 0.0,
             supply_v=supply[k] if len(supply) else still["supply_v"],
             airflow_torque_nm=airflow[k] if len(airflow) else 0.0,
             bridge_open=False,
         )
         measured = values["sensed_angle_deg"]
-        for name in names[:-1]:
-            out[name][k] = values[name]
-    return out
+        rows.append(values)
+    known = [name for name in names if name in rows[0]]
+    return {name: np.array([row[name] for row in rows]) for name in known} | {"duty": duty}

@@ -12,16 +12,15 @@ import numpy as np
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop.controller_families import Setup, groups_of
 from mgdd.loop.many_tracks import track_many
+from mgdd.loop.plates import PlateLike, PlatePlant, plate_of
 from mgdd.loop.reference import Reference
 from mgdd.loop.tuned import family_of, shipped_numbers
 from mgdd.parallel.finished import hand_over
-from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.result import NumbersResult
+from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from mgdd.throttle import Throttle
 
 _SPREAD_FIELDS = (
     ("inertia_kgm2",),
@@ -106,13 +105,14 @@ class Tuning(NumbersResult):
 
 def tune_controller(
     kind: str,
-    throttle: ThrottleLike,
+    throttle: PlateLike | Sequence[PlateLike],
     *,
+    model: Any = None,
     n_throttles: int = 20,
     spread: float = 0.2,
     budget: int = 200,
     seed: int = 0,
-    delay_samples: int = 1,
+    delay_samples: int | None = None,
     noise_deg: float = 0.03,
     workers: int | None = None,
 ) -> Tuning:
@@ -125,8 +125,11 @@ def tune_controller(
     ----------
     kind : str
         ``guided``, ``mgdd1``, ``pid``, ``sliding_mode``, ``linear_mpc`` or ``nmpc``.
-    throttle : Throttle, Preset, str or path-like
-        The centre of the throttles, and what the controller knows.
+    throttle : Throttle, Preset, Fit, its model, str or path-like, or a sequence of plants
+        The centre of the throttles, and what the controller knows. A sequence, or an object with ``step(duty)`` and
+        ``output`` as `track` takes it, is all the plants that there are: none is drawn.
+    model : optional
+        What the controller knows, as for `tuned_controller`; `throttle` if left out.
     n_throttles, spread : int, float
         How many throttles, and the share by which seven of their numbers vary.
     budget : int
@@ -134,7 +137,7 @@ def tune_controller(
     seed : int
         Of throttles, noise and search.
     delay_samples, noise_deg : int, float
-        As for `track_many`.
+        As for `track_many`; left out, the delay of the model, to the nearest sample, or 1 where it has none.
     workers : int, optional
         As for `track_many`.
 
@@ -161,11 +164,22 @@ def tune_controller(
     """
     family = family_of(kind)
     ParameterError.unless(budget >= 30, "budget", budget, ">= 30")
-    throttle = throttle_of(throttle)
-    groups = groups_of(throttle)
-    setup = Setup(delay_samples=delay_samples, noise_deg=noise_deg)
-    throttles = draw_throttles(throttle, n_throttles, spread=spread, seed=seed)
+    stated = isinstance(throttle, Sequence) and not isinstance(throttle, str)
+    plants: list[Any] = [*throttle] if stated else [throttle]  # type: ignore[misc]
+    if not plants:
+        raise ParameterError("throttle: give at least one plant")
+    plates = [plate_of(each) for each in plants]
+    known = plates[0] if model is None else plate_of(model)
+    if isinstance(known.plant, PlatePlant):
+        raise ParameterError.of(
+            "model", model, "what the controller knows of a plant of your own: a fit of its log, a Throttle or a preset"
+        )
     references = [reference for reference, _ in tuning_references().values()]
+    groups, centre = groups_of(known.model or known.plant), plates[0].plant
+    delay_samples = known.delay_samples(delay_samples, references[0].sample_s)
+    setup = Setup(delay_samples=delay_samples, noise_deg=noise_deg)
+    if isinstance(centre, Throttle) and not stated:
+        plants = draw_throttles(centre, n_throttles, spread=spread, seed=seed)
     seen: list[tuple[float, tuple[float, ...]]] = []
 
     def cost_of(shares: Sequence[float]) -> float:
@@ -176,7 +190,7 @@ def tune_controller(
         runs = track_many(
             {kind: controller},
             references,
-            throttles,
+            plants,
             delay_samples=delay_samples,
             noise_deg=noise_deg,
             first_seed=seed,
@@ -208,7 +222,7 @@ def tune_controller(
         start_cost=seen[0][0],
         evaluations=len(seen),
         settings={
-            "n_throttles": n_throttles,
+            "n_throttles": len(plants),
             "spread": spread,
             "seed": seed,
             "delay_samples": delay_samples,

@@ -187,6 +187,8 @@ class MapSeeking(_core.optimize.MapSeeking):
     def suggest(self) -> Suggestion:
         """Give the operating point and inputs of the next visit; asking again before `tell` gives the same.
 
+        After a reading of a cell that lies far off what was expected it is the same visit once more, twice at most.
+
         Returns
         -------
         Suggestion

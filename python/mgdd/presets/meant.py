@@ -70,14 +70,26 @@ def engine_of(cylinder: Any, point: Any = None, **fields: float | None) -> tuple
     return engine, whole.replace(**changes) if changes else whole
 
 
-def throttle_of(given: Any) -> Throttle:
+def throttle_of(given: Any, needed: str = "a Throttle") -> Throttle:
     """Return the throttle that is meant by one, a preset of one, its name, or its ``.toml`` file."""
     meant = _loaded(given, "throttle")
     if isinstance(meant, Preset):
         return meant.throttle
     if isinstance(meant, Throttle):
         return meant
-    raise _refusal("throttle", given, "a Throttle", "throttle")
+    raise _refusal("throttle", given, needed, "throttle")
+
+
+# Of a fit of duty and angle: they do not show how strong the motor is and how heavy the plate.
+_OF_NO_MATTER = {"resistance_ohm": 1.0, "supply_v": 12.0, "inertia_kgm2": 2e-3}
+
+
+def moving_throttle_of(given: Any) -> tuple[Throttle, Any]:
+    """Return a throttle that moves as what is given, and the model that it was made of, None for a throttle itself."""
+    meant = throttle_model_of(given)
+    if hasattr(meant, "to_throttle"):
+        return meant.to_throttle(**_OF_NO_MATTER), meant
+    return throttle_of(meant, "a Throttle, a first-principle fit of one"), None
 
 
 def throttle_model_of(given: Any) -> Any:

@@ -50,6 +50,8 @@ class Result:
     else:
 
         def __getattr__(self, name: str) -> Any:
+            if hasattr(type(self), name):  # a property whose own code lacks an attribute: say which
+                return object.__getattribute__(self, name)
             kind, names = type(self).__name__, [each for each in dir(self) if not each.startswith("_")]
             hint = "" if name.startswith("_") else did_you_mean(name, names) or f"it has {', '.join(names)}"
             raise AttributeError(f"{kind!r} object has no attribute {name!r}: {hint}", name=name, obj=self)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
-from mgdd.presets.meant import ThrottleLike, throttle_model_of
+from mgdd.presets.meant import ThrottleLike, throttle_model_of, throttle_of
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 
 # The order of the core's state; angles of motor and gear at plate scale, then of the plate.
@@ -73,7 +73,8 @@ def to_iosystem(
     ...     assert system.dt == 0.001
     ...     assert rest.round(6).tolist() == [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
     """
-    plant_model: Throttle | PseudoWiener = throttle_model_of(model)
+    meant = throttle_model_of(model)
+    plant_model: Throttle | PseudoWiener = meant if isinstance(meant, PseudoWiener) else throttle_of(meant)
     try:
         import control
     except ImportError as error:

@@ -12,7 +12,7 @@ from mgdd import _core
 from mgdd._settings import remade
 from mgdd.errors import DataError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
-from mgdd.presets.meant import ThrottleLike, throttle_of
+from mgdd.presets.meant import ThrottleLike, moving_throttle_of
 from mgdd.results.describe import described, rows_of
 from mgdd.signals.even_grid import even_step, is_same_step
 from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of
@@ -20,6 +20,8 @@ from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_o
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
+
+    from mgdd.results import Fit
 
 
 _KINDS = ("pw_r", "pw_w", "pw_p")
@@ -86,20 +88,24 @@ class PseudoWiener(SampledModel, Parameters):
         self._options = {"switching": switching, "friction": friction}
 
     @classmethod
-    def of_throttle(cls, throttle: ThrottleLike) -> PseudoWiener:
+    def of_throttle(cls, throttle: ThrottleLike | Fit | SampledModel) -> PseudoWiener:
         """Give PW-R with the groups of a first-principle throttle.
 
         Parameters
         ----------
-        throttle : Throttle, Preset, str or path-like
-            tau = J/b, G = g/J, preload, spring and Coulomb torque over the stall torque g.
+        throttle : Throttle, Preset, str or path-like, first-principle Fit or its model
+            tau = J/b, G = g/J, preload, spring and Coulomb torque over the stall torque g; of a fit the delay, too.
 
         Returns
         -------
         PseudoWiener
             Without inductance, stiction and the softness of the stops, which PW-R does not have.
         """
-        return cls("pw_r", _core.throttle.pseudo_wiener_of(throttle_of(throttle)).parameters)
+        body, fit = moving_throttle_of(throttle)
+        model = cls("pw_r", _core.throttle.pseudo_wiener_of(body).parameters)
+        if fit is None:
+            return model
+        return model.at_sample(fit.sample_s).replace(delay_samples=fit.parameters["delay_samples"])
 
     @property
     def kind(self) -> str:

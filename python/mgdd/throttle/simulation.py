@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.presets.meant import ThrottleLike, throttle_of
+from mgdd.presets.meant import ThrottleLike, throttle_model_of, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.model import columns_of, is_timed
+from mgdd.signals.model import SampledModel, columns_of, is_timed
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from mgdd.results import Fit
     from mgdd.results.dataset import Dataset
 
 _DEFAULT_DURATION_S = 1.0
@@ -28,7 +29,7 @@ _MOVED_DEG = 0.01
 
 
 def simulate_throttle(
-    throttle: ThrottleLike | Sequence[ThrottleLike],
+    throttle: ThrottleLike | Sequence[ThrottleLike] | Fit | SampledModel,
     duty: Any,
     *,
     time_s: ArrayLike | None = None,
@@ -44,9 +45,9 @@ def simulate_throttle(
 
     Parameters
     ----------
-    throttle : Throttle, Preset, str or path-like, or a sequence of them
+    throttle : Throttle, Preset, str or path-like, or a sequence of them; Fit or its model
         The throttle; or a preset, its name or its file; a sequence is one case each, with friction and backlash of the
-        same form.
+        same form. A fit runs as its model does, with its delay; it gives the angle and starts at rest.
     duty : float or array_like, shape (n,), or a signal with its time
         Duty [-], -1 to 1, positive opens. Sample k acts from ``time_s[k]`` to ``time_s[k + 1]``. A Dataset, DataFrame
         or mapping with ``time_s`` and ``duty``, and a DataArray or Series over ``time_s``, bring their time.
@@ -105,6 +106,10 @@ def simulate_throttle(
     times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
     supply = _signal("supply_v", supply_v, column.size)
     air = _signal("airflow_torque_nm", airflow_torque_nm, column.size)
+    model = throttle_model_of(throttle)
+    if isinstance(model, SampledModel):
+        stated = {"supply_v": supply_v, "airflow_torque_nm": airflow_torque_nm if air.any() else None}
+        return _run_of_fit(model, times, column, start_deg, stated | {"bridge": None if bridge == "brake" else bridge})
     body: Throttle | list[Throttle]
     if isinstance(throttle, Sequence) and not isinstance(throttle, str):
         body = [throttle_of(each) for each in throttle]
@@ -142,6 +147,24 @@ def simulate_throttle(
     if air.any():
         variables["airflow_torque_nm"] = ("time_s", air)
     return labelled_dataset(variables, attrs={"start_deg": start, **settings, **body.to_dict()})
+
+
+def _run_of_fit(
+    model: SampledModel,
+    time_s: NDArray[np.float64],
+    duty: NDArray[np.float64],
+    start_deg: Any,
+    stated: Mapping[str, Any],
+) -> Dataset:
+    """Run what a log in duty and angle has shown."""
+    for name, value in stated.items():
+        if value is not None:
+            bound = "left out with a fit, which knows duty and angle only; its .model.to_throttle(...) is a Throttle"
+            raise ParameterError.of(name, value, bound)
+    if np.ndim(start_deg):
+        raise ParameterError.of("start_deg", start_deg, "one angle with a fit")
+    start = {} if start_deg is None else {"angle_deg": float(start_deg)}
+    return cast("Dataset", model.simulate({"time_s": time_s, "duty": duty}, initial_state=start))
 
 
 def step_summary(run: xr.Dataset) -> dict[str, float]:

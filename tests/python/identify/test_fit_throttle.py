@@ -132,7 +132,7 @@ def test_the_throttle_of_a_model_has_its_numbers_from_either_known_one():
         ({"presliding_deg": 0.3}, 99.0),
         ({"stop_duty_per_deg": 20.0, "stop_damping": 0.6}, 99.5),
         ({"tau_s": 0.25, "gain_deg_per_s2_per_duty": 1e4}, 97.0),
-        ({"half_gap_deg": 0.5}, 94.0),
+        ({"half_gap_deg": 0.5}, 98.5),
     ],
 )
 def test_the_throttle_of_a_model_moves_as_it_does(groups, least):

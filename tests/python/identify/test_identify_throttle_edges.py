@@ -9,16 +9,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from independent_throttle import FAMILIES
 from mgdd import presets
 from mgdd.cli import main
 from mgdd.errors import ParameterError
 from mgdd.identify import design_excitation, identify_throttle, validate_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.identify import doubts
+from mgdd.identify.throttle.record_content import moves_against
 from mgdd.io import throttle_log, write_csv
 from mgdd.optimize import FitOptions
 from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import Throttle, characteristics, simulate_throttle
+from throttle_bodies import draw_body, make_logs
 
 NOISE_DEG = 0.03
 
@@ -152,3 +155,21 @@ def test_a_fit_far_below_its_noise_ceiling_is_doubted(p1: Throttle) -> None:
     good = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
     assert good.train.nrmse_fit_percent > 98.0
     assert "below_ceiling" not in {found.code for found in good.findings}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_plate_that_moves_against_the_duty_is_named(family: str) -> None:
+    for seed in (2, 7):
+        time, duty, angle = make_logs(draw_body(family, seed), seed)[0]
+        assert moves_against(time, duty, angle, (0.0, 88.0)) == ()
+        for turned in ((time, -duty, angle), (time, duty, 88.0 - angle)):
+            (finding,) = moves_against(*turned, (0.0, 88.0))
+            assert finding.code == "moves_against_duty"
+            assert "negate" in finding.remedy
+
+
+def test_a_fit_of_a_turned_log_says_so_first(p1: Throttle) -> None:
+    log = measured(p1, swing(3.0))
+    log["duty"] = -log["duty"]
+    fit = identify_throttle(log, "pw_r", options=FitOptions(n_starts=1))
+    assert fit.findings[0].code == "moves_against_duty"

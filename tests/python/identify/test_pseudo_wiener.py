@@ -11,6 +11,7 @@ import xarray as xr
 
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import Model
@@ -183,3 +184,14 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[0], method="newton")
     with pytest.raises(ParameterError, match="'mass' is not a parameter"):
         OnlineUpdate(MODELS[0], free=["mass"])
+
+
+def test_an_update_starts_from_the_groups_of_a_fit() -> None:
+    late = {**FirstPrincipleModel().parameters, "tau_s": 0.05, "delay_samples": 2.5}
+    fit = FirstPrincipleModel(parameters=late | {"beta_below_duty": 0.21}, sample_s=5e-4)
+    start = OnlineUpdate(fit).model.parameters
+    assert start["above_tau_s"] == pytest.approx(0.05)
+    assert start["below_preload_duty"] == pytest.approx(0.21)
+    assert (start["sample_s"], start["delay_samples"]) == (5e-4, 2.5)
+    with pytest.raises(ParameterError, match="delay_samples"):
+        OnlineUpdate(FirstPrincipleModel(parameters=late | {"delay_samples": 9.0}))

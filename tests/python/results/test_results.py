@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from mgdd.errors import ConvergenceError, DataError, Error, ParameterError, ShapeError
 from mgdd.results.labels import ANGLE, VARIABLES, Label, check_labels, labelled_dataset, to_jsonable
+from mgdd.results.result import Result
 from mgdd.results.units import _UNITS, _WHOLE, attribute_units, printed_units, unit_attributes, unit_of
 
 
@@ -226,3 +227,13 @@ def test_what_is_no_unit_is_refused(units):
 )
 def test_the_unit_at_the_end_of_a_name_is_read_by_pint(ending):
     pint.application_registry.parse_units(attribute_units(unit_of(f"x{ending}")))
+
+
+def test_what_a_property_lacks_is_named_and_not_the_property() -> None:
+    class Halved(Result):
+        @property
+        def half(self) -> float:
+            return self.extent / 2.0
+
+    with pytest.raises(AttributeError, match="extent"):
+        _ = Halved().half

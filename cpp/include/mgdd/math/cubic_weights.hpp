@@ -44,16 +44,15 @@ inline CubicWeights cubic_weights(std::span<const double> x, std::size_t k, doub
   w.count = std::min(k + 2, x.size() - 1) - w.first + 1;
   const auto node = x.subspan(w.first, w.count);
   for (std::size_t i = 0; i < w.count; ++i) {
-    w.value[i] = 1.0;
+    double value = 1.0, slope = 0.0, own = 1.0;
     for (std::size_t j = 0; j < w.count; ++j) {
       if (j == i) continue;
-      w.value[i] *= (at - node[j]) / (node[i] - node[j]);
-      double term = 1.0 / (node[i] - node[j]);  // the factor of j differentiated, the others kept
-      for (std::size_t m = 0; m < w.count; ++m) {
-        if (m != i && m != j) term *= (at - node[m]) / (node[i] - node[m]);
-      }
-      w.slope[i] += term;
+      slope = slope * (at - node[j]) + value;
+      value *= at - node[j];
+      own *= node[i] - node[j];
     }
+    w.value[i] = value / own;
+    w.slope[i] = slope / own;
   }
   return w;
 }

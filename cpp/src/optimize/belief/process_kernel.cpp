@@ -1,6 +1,8 @@
 #include "mgdd/optimize/belief/process_kernel.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace mgdd::optimize {
@@ -11,7 +13,15 @@ constexpr double level_sd = 3.0, slope_sd = 0.4, bend_sd = 0.6, coupling_sd = 0.
 // What a model misses depends less on the operating point than on the input: of both, as shares. Readings at one point
 // alone would else leave all others in doubt.
 constexpr double context_share = 0.4;
-constexpr double parabola_sd = 0.0745;  // of |z - 1/2|^2 over evenly spread z, one input: 1/sqrt(180)
+constexpr double one_node = 1.0 + 1e-9;  // a coarser grid smooths as much as a secant does
+constexpr double parabola_sd = 0.0745;   // of |z - 1/2|^2 over evenly spread z, one input: 1/sqrt(180)
+
+// Slopes, bends and the couplings of every pair once, from the sum of the products of two points and of their squares.
+template <class T>
+T quadratic(const T& products, const T& squares) {
+  return slope_sd * slope_sd * products + 0.25 * bend_sd * bend_sd * squares +
+         0.5 * coupling_sd * coupling_sd * (products * products - squares);
+}
 
 }  // namespace
 
@@ -33,6 +43,18 @@ void ProcessKernel::describe(const Inputs& z, double* point) const noexcept {
   Inputs slopes(inputs_);
   const double value = guide_.surface.read(guide_.lower + z.cwiseProduct(range), slopes);
   point[inputs_] = guide_.sign * (value - guide_middle_);
+  // A kink that lies somewhere else is foreseen on both sides of where the guide has it.
+  for (Eigen::Index i = context_; i < inputs_; ++i) {
+    const auto nodes = static_cast<double>(guide_.surface.axes()[static_cast<std::size_t>(i)].size());
+    if (!(guide_.secant * (nodes - 1.0) > one_node)) continue;
+    const auto at = [&](double place) {
+      Inputs moved = z;
+      moved[i] = place;
+      return guide_.surface(guide_.lower + moved.cwiseProduct(range));
+    };
+    const double low = std::max(z[i] - guide_.secant, 0.0), high = std::min(z[i] + guide_.secant, 1.0);
+    slopes[i] = (at(high) - at(low)) / ((high - low) * range[i]);
+  }
   Eigen::Map<Eigen::VectorXd>(point + inputs_ + 1, inputs_) = guide_.sign * slopes.cwiseProduct(range);
 }
 
@@ -46,12 +68,11 @@ double ProcessKernel::mean(const double* point, const Scales& s) const noexcept 
 }
 
 ProcessKernel::Fixed ProcessKernel::fixed(const double* a, const double* b) const noexcept {
-  double slopes = 0.0, bends = 0.0, couplings = 0.0, guide = 0.0;
+  double slopes = 0.0, squares = 0.0, guide = 0.0;
   for (Eigen::Index i = 0; i < inputs_; ++i) {
     const double both = (a[i] - 0.5) * (b[i] - 0.5) * (i < context_ ? of_context_ : 1.0);
-    couplings += slopes * both;  // of every pair once
     slopes += both;
-    bends += 0.25 * both * both;
+    squares += both * both;
   }
   if (guided()) {
     double places = 0.0;
@@ -59,7 +80,7 @@ ProcessKernel::Fixed ProcessKernel::fixed(const double* a, const double* b) cons
       places += a[i] * b[i];
     guide = guide_.factor_sd * guide_.factor_sd * a[inputs_] * b[inputs_] + guide_.place_sd * guide_.place_sd * places;
   }
-  return {slope_sd * slope_sd * slopes + bend_sd * bend_sd * bends + coupling_sd * coupling_sd * couplings, guide};
+  return {quadratic(slopes, squares), guide};
 }
 
 double ProcessKernel::matern(const double* a, const double* b, const Inputs& inverse_length) const noexcept {
@@ -77,29 +98,37 @@ double ProcessKernel::join(const Fixed& f, double matern, const Scales& s) const
   return level * level + s.bend * s.bend * (f.quadratic + s.rest * matern) + s.guide * s.guide * f.guide;
 }
 
+// Blocks that registers hold.
 void ProcessKernel::covariances(const double* point, const Columns& others, Eigen::Index count, const Scales& s,
                                 double* out) const noexcept {
-  using Row = Eigen::Array<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, most_kept>;
-  Row slopes = Row::Zero(count), rest = slopes, squares = slopes, both(count);
-  for (Eigen::Index i = 0; i < inputs_; ++i) {
-    const auto own = others.row(i).head(count).array();
-    both = (i < context_ ? of_context_ : 1.0) * (point[i] - 0.5) * (own - 0.5);
-    rest += both * (coupling_sd * coupling_sd * slopes + 0.25 * bend_sd * bend_sd * both);
-    slopes += both;
-    squares += ((own - point[i]) * s.inverse_length[i]).square();
-  }
-  rest += slope_sd * slope_sd * slopes;
-  squares = (5.0 * squares).sqrt();
-  rest += s.rest * (1.0 + squares + squares.square() / 3.0) * (-squares).exp();
   const double level = level_sd * whole_bend(s);
-  rest = level * level + s.bend * s.bend * rest;
-  if (guided()) {
-    both = guide_.factor_sd * guide_.factor_sd * point[inputs_] * others.row(inputs_).head(count).array();
-    for (Eigen::Index i = inputs_ + 1; i < width(); ++i)
-      both += guide_.place_sd * guide_.place_sd * point[i] * others.row(i).head(count).array();
-    rest += s.guide * s.guide * both;
-  }
-  Eigen::Map<Row>(out, count) = rest;
+  const auto of_block = [&]<int size>(std::integral_constant<int, size>, Eigen::Index from) {
+    using Block = Eigen::Array<double, 1, size>;
+    Block slopes = Block::Zero(), both_squared = slopes, squares = slopes, guide = slopes;
+    for (Eigen::Index i = 0; i < inputs_; ++i) {
+      const Block own = others.row(i).segment<size>(from);
+      const Block both = ((i < context_ ? of_context_ : 1.0) * (point[i] - 0.5)) * (own - 0.5);
+      slopes += both;
+      both_squared += both.square();
+      squares += ((own - point[i]) * s.inverse_length[i]).square();
+    }
+    squares = (5.0 * squares).sqrt();
+    squares = (1.0 + squares + squares.square() * (1.0 / 3.0)) * (-squares).exp();
+    if (guided()) {
+      for (Eigen::Index i = inputs_ + 1; i < width(); ++i)
+        guide += point[i] * others.row(i).segment<size>(from).array();
+      guide = guide_.factor_sd * guide_.factor_sd * point[inputs_] * others.row(inputs_).segment<size>(from).array() +
+              guide_.place_sd * guide_.place_sd * guide;
+    }
+    Eigen::Map<Block>(out + from) = level * level +
+                                    s.bend * s.bend * (quadratic(slopes, both_squared) + s.rest * squares) +
+                                    s.guide * s.guide * guide;
+  };
+  Eigen::Index from = 0;
+  for (; from + 8 <= count; from += 8)
+    of_block(std::integral_constant<int, 8>{}, from);
+  for (; from < count; ++from)
+    of_block(std::integral_constant<int, 1>{}, from);
 }
 
 }  // namespace mgdd::optimize

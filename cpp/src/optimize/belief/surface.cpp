@@ -8,6 +8,19 @@
 #include "mgdd/common/error.hpp"
 
 namespace mgdd::optimize {
+namespace {
+
+// A table without its first axis, `left` numbers for each of its nodes; `to` may be `from`.
+void contract(const double* from, std::size_t left, std::size_t count, const std::array<double, 4>& weights,
+              double* to) noexcept {
+  const auto part = [&](std::size_t k) {  // weights beyond the last node are 0
+    return weights[k] *
+           Eigen::Map<const Eigen::ArrayXd>(from + (k < count ? k * left : 0), static_cast<Eigen::Index>(left));
+  };
+  Eigen::Map<Eigen::ArrayXd>(to, static_cast<Eigen::Index>(left)) = part(0) + part(1) + part(2) + part(3);
+}
+
+}  // namespace
 
 Surface::Surface(std::vector<std::vector<double>> axes, std::vector<double> values)
     : axes_(std::move(axes)), values_(std::move(values)) {
@@ -34,35 +47,26 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
   const std::size_t n = axes_.size();
   std::array<CubicWeights, most_inputs> on;
   std::array<std::size_t, most_inputs> stride{}, step{};
-  std::size_t nodes = 1;
+  std::size_t nodes = 1, node = 0;
   for (std::size_t i = n; i-- > 0;) {
-    stride[i] = nodes;
-    nodes *= axes_[i].size();
     const auto own = static_cast<Eigen::Index>(i);
     const double held = std::clamp(at[own], axes_[i].front(), axes_[i].back());
     on[i] = cubic_weights(axes_[i], interval_of(axes_[i], held), held);
     if (held != at[own]) on[i].slope.fill(0.0);
-  }
-  // Rows of nodes around along the last axis, which lie side by side, then without their last axis, and so on: what is
-  // left of the value and of every slope.
-  constexpr Eigen::Index rows = 256;
-  static_assert(most_inputs == 5);  // of four nodes each
-  Eigen::Array<double, rows, 1> value;
-  Eigen::Array<double, rows, most_inputs> slope;  // a column per axis
-  const auto contract = [](const double* from, const std::array<double, 4>& weights, std::size_t count) {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < count; ++k)
-      sum += weights[k] * from[k];
-    return sum;
-  };
-  const auto axes = static_cast<Eigen::Index>(n);
-  std::size_t node = 0;
-  for (std::size_t i = 0; i < n; ++i)
+    stride[i] = nodes;
+    nodes *= axes_[i].size();
     node += on[i].first * stride[i];
-  Eigen::Index left = 0;
-  for (bool more = true; more; ++left) {
-    value[left] = contract(&values_[node], on[n - 1].value, on[n - 1].count);
-    slope(left, axes - 1) = contract(&values_[node], on[n - 1].slope, on[n - 1].count);
+  }
+  // The nodes around side by side, the last axis fastest, then without their first axis, and so on: what is left of the
+  // value and of every slope.
+  constexpr std::size_t most = 1024;
+  static_assert(most_inputs == 5);  // of four nodes each
+  std::array<double, most> value;
+  std::array<std::array<double, most / 4>, most_inputs> slope;  // per axis
+  std::size_t left = 0;
+  for (bool more = true; more;) {
+    for (std::size_t k = 0; k < on[n - 1].count; ++k)
+      value[left++] = values_[node + k];
     more = false;
     for (std::size_t axis = n - 1; axis-- > 0 && !more;) {
       more = ++step[axis] < on[axis].count;
@@ -72,19 +76,15 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
       node -= on[axis].count * stride[axis];
     }
   }
-  for (Eigen::Index i = axes - 1; i-- > 0;) {
-    const CubicWeights& own = on[static_cast<std::size_t>(i)];
-    const auto count = static_cast<Eigen::Index>(own.count);
-    left /= count;
-    for (Eigen::Index p = 0; p < left; ++p) {
-      const Eigen::Index from = p * count;
-      slope(p, i) = contract(&value[from], own.slope, own.count);
-      for (Eigen::Index k = i + 1; k < axes; ++k)
-        slope(p, k) = contract(&slope(from, k), own.value, own.count);
-      value[p] = contract(&value[from], own.value, own.count);
-    }
+  for (std::size_t i = 0; i < n; ++i) {
+    left /= on[i].count;
+    contract(value.data(), left, on[i].count, on[i].slope, slope[i].data());
+    contract(value.data(), left, on[i].count, on[i].value, value.data());
+    for (std::size_t k = 0; k < i; ++k)
+      contract(slope[k].data(), left, on[i].count, on[i].value, slope[k].data());
   }
-  slopes = slope.row(0).head(axes).matrix().transpose();
+  for (std::size_t i = 0; i < n; ++i)
+    slopes[static_cast<Eigen::Index>(i)] = slope[i][0];
   return value[0];
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/laws/map_seeking.hpp"
@@ -206,8 +207,25 @@ void MapSeeking::know_edges(std::span<const Place> places) noexcept {
   }
 }
 
-// The candidates of every place that keep its limits, the best one among them in any case. Where none does, the map
-// gives the one that most likely does, and less doubt about its limits is worth what J ranges over.
+// Of a place without an input that is known to be safe, the one that is worth most of those that are as likely to keep
+// the limits as any, to `limit_probability`: towards the likeliest one that says little more.
+void MapSeeking::know_likeliest(Place& place, int from) noexcept {
+  const auto likely = [this](int p) {
+    return 0.5 * std::erfc(odds_[static_cast<std::size_t>(p)] / std::numbers::sqrt2);
+  };
+  double likeliest = 0.0, most = -std::numeric_limits<double>::infinity();
+  for (int p = from; p < from + per_place; ++p)
+    likeliest = std::max(likeliest, likely(p));
+  if (!(likeliest > 0.0)) return;
+  for (int p = from; p < from + per_place; ++p) {
+    if (likely(p) < settings_.limit_probability * likeliest || worth(p) <= most) continue;
+    most = worth(p);
+    place.known = p;
+  }
+}
+
+// The candidates of every place that keep its limits, the best one among them in any case. Where none does, less doubt
+// about its limits is worth what J ranges over.
 void MapSeeking::choose_safe(std::span<Place> places) noexcept {
   int count = 0;
   for (std::size_t c = 0; c < places.size(); ++c) {
@@ -221,8 +239,7 @@ void MapSeeking::choose_safe(std::span<Place> places) noexcept {
     }
     places[c].known = from;
     if (over_[static_cast<std::size_t>(from)] <= 0.0) continue;
-    const auto odds = odds_.begin() + from;
-    places[c].known += static_cast<int>(std::min_element(odds, odds + per_place) - odds);
+    know_likeliest(places[c], from);
     for (std::size_t i = 0; i < limited_.size(); ++i)
       multipliers_[c * limited_.size() + i] = high - low;
   }

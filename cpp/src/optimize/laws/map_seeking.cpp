@@ -17,8 +17,6 @@ constexpr double alike = 0.01;  // ranges: readings closer than that are average
 // of the bounds in its place. It holds that much over all points; wider ones let the first readings explore for
 // nothing.
 constexpr double missed = -3.5, missed_sd = 1.0, rest = -3.0, factor_sd = 0.2, place_sd = 0.1;
-// A pressure or its rise is not of the combustion alone: far off a limit it says less of the factor near it.
-constexpr double limit_factor_sd = 0.3;
 constexpr double powers = 10.0;             // that a limit spans, for its logarithm
 constexpr std::int64_t calm_readings = 10;  // after a doubt
 constexpr std::size_t most_cells = 10'000;
@@ -62,7 +60,7 @@ std::vector<LimitProcess> map_limit_processes(const MapSeekingSettings& s, int m
   for (std::size_t i = 0; i < s.limits.size(); ++i) {
     const Surface guide = s.limit_guides.empty() ? Surface{} : s.limit_guides[i];
     ProcessModel::Settings own = map_process_settings(s, most_points);
-    own.guide.factor_sd = limit_factor_sd;
+    own.guide.secant = place_sd;  // its kinks, as where combustion outgrows compression, move with the rest
     out.emplace_back(s.limits[i], own, guide, 0, powers);
   }
   return out;
@@ -252,8 +250,11 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
     if (suggested_ || &place == &places_.back()) place.from = place.best;
   }
   suggested_ = false;
+  bool of_cell = false;
   for (std::size_t c = 0; c < cells(); ++c) {
-    if (cell(c) == context) failures_[c] = reading.misfire ? failures_[c] + 1.0 : 0.0;
+    if (cell(c) != context) continue;
+    of_cell = true;
+    failures_[c] = reading.misfire ? failures_[c] + 1.0 : 0.0;
   }
   failing_.record(z, !reading.misfire, z);
   failing_.fit(z);
@@ -267,7 +268,7 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
   j_.scattered(scatter(0), readings);
   const double odd = j_.record(z, settings_.maximize ? reading.components[0] : -reading.components[0], z, readings);
   const bool surprising = surprise_.add(odd);
-  again_ = odd > odd_visit && again_ < most_again ? again_ + 1 : 0;
+  again_ = of_cell && odd > odd_visit && again_ < most_again ? again_ + 1 : 0;
   for (std::size_t i = 0; i < limited_.size(); ++i)
     limited_[i].record(z, reading.limits[i], z, readings, scatter(1 + i));
   if (++since_doubt_ >= calm_readings && surprising) {

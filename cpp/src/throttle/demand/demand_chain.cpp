@@ -17,6 +17,8 @@ using T = EngineTorque;
 using A = IntakeAir;
 using B = ThrottleBore;
 using R = ReferenceShape;
+constexpr double slowest_rpm = 300.0;  // a starter turns no faster: a standing engine breathes nothing
+
 constexpr std::array field_table{
     field<&C::torque, &T::indicated_efficiency>(
         {"indicated_efficiency", "-", above(0.0, 1.0), "indicated work over the heat of the fuel"}),
@@ -122,8 +124,7 @@ double DemandModel::opening_deg(double air_kg_per_s, double pressure_pa, double 
 Demand DemandModel::wanted(double pedal_percent, double speed_rpm) const noexcept {
   Demand out;
   out.torque_nm = chain_.pedal_map.torque_nm(pedal_percent, speed_rpm);
-  // A standing engine breathes nothing: what it wants is read at the first speed of the table.
-  const double speed = std::max(speed_rpm, chain_.pedal_map.speed_rpm.front());
+  const double speed = std::max(speed_rpm, slowest_rpm);
   out.air_kg_per_s = chain_.torque.air_kg_per_s(out.torque_nm, speed);
   out.pressure_pa = out.air_kg_per_s / chain_.air.pumping_kg_per_s_pa(speed);
   return out;
@@ -153,7 +154,7 @@ TrackedDemand DemandTracker::step(double pedal_percent, double speed_rpm, double
     return out;
   }
   const DemandChain& chain = model_.chain();
-  const double speed = std::max(*speed_rpm_, chain.pedal_map.speed_rpm.front());
+  const double speed = std::max(*speed_rpm_, slowest_rpm);
   const Demand steady = model_.wanted(*pedal_percent_, speed);
   const double before = wanted_pa_.value_or(steady.pressure_pa);
   const double wanted = before + pressure_share_ * (steady.pressure_pa - before);

@@ -42,7 +42,7 @@ TYPICAL = MappingProxyType(
 )
 _POSITIVE = ("tau_s", "gain_deg_per_s2_per_duty", "stribeck_deg_per_s", "ramp_deg")
 LONGEST_DELAY = 20.0
-_RIGID_DUTY_PER_DEG = 200.0  # of a stop that yields too little to be seen
+_RIGID_DUTY_PER_DEG = 200.0  # what is as stiff yields too little to be seen
 _CORE_DELAY = 5.0  # of a model of the core, whose delay line is part of its state
 
 
@@ -145,10 +145,10 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
     ) -> Throttle:
         """Compute the throttle with these groups: g = K V/R and G = g/J leave one number to be known.
 
-        It moves as the model does; nothing is that of a preset. What a log in duty and angle cannot show follows from
-        the groups: of the damping the share that is not back-EMF is viscous, rigid stops yield by 0.005° under the
-        stall torque and do not rebound, a gap has a seventh of the inertia on the side of the plate. A delay is none of
-        a throttle: give `delay_samples` to `mgdd.loop.track`.
+        It moves as the model does, and nothing that acts is a preset's. What a log in duty and angle cannot show
+        follows from the groups: of the damping the share that is not back-EMF is viscous; rigid stops and the flanks of
+        a gap yield by 0.005° under the stall torque and do not rebound; behind a gap are a seventh of the inertia and
+        all of the friction. A delay is none of a throttle: give `delay_samples` to `mgdd.loop.track`.
 
         Parameters
         ----------
@@ -204,7 +204,15 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             given["bristle_nm_per_rad"] = bristle
             given["bristle_damping_nms_per_rad"] = 2.0 * p["presliding_damping"] * math.sqrt(bristle * inertia)
         if p["half_gap_deg"] > 0.0:
-            given |= {"backlash": "compliance", "backlash_half_deg": p["half_gap_deg"]}
+            gear, plate = _RIGID_DUTY_PER_DEG * per_rad * stall, inertia / 7.0
+            given |= {
+                "backlash": "compliance",
+                "backlash_half_deg": p["half_gap_deg"],
+                "gear_stiffness_nm_per_rad": gear,
+                "gear_damping_nms_per_rad": 2.0 * math.sqrt(gear * plate),
+                "plate_inertia_kgm2": plate,
+                "plate_friction_share": 1.0,
+            }
         return Throttle(
             inertia_kgm2=inertia,
             torque_constant_nm_per_a=constant,
@@ -226,6 +234,5 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             open_deg=self.open_deg,
             stop_stiffness_nm_per_rad=stop,
             stop_damping_nms_per_rad=2.0 * (1.0 if rigid else p["stop_damping"]) * math.sqrt(stop * inertia),
-            plate_inertia_kgm2=inertia / 7.0,
             **given,
         )

@@ -13,7 +13,7 @@ from mgdd.identify.throttle.first_principle_problem import shows_limp_home
 from mgdd.identify.throttle.fits import CHOICES, PSEUDO_WIENER, check_kind, fit_kind
 from mgdd.identify.throttle.free_run import as_log, free_run, quality_of, source_of
 from mgdd.identify.throttle.prior import prior_of
-from mgdd.identify.throttle.record_content import open_questions, record_content
+from mgdd.identify.throttle.record_content import moves_against, open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
 from mgdd.io.throttle_checks import check_sides, check_throttle_log
 from mgdd.results import Fit
@@ -195,9 +195,8 @@ def identify_throttle(
     tested = None if test is None else quality_of([free_run(fit.model, test)])
     prior = prior_of(fit.model)
     home = prior.limp_home_deg if estimated or limp_home is None else limp_home
-    content = record_content(
-        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=prior.stops_deg
-    )
+    time, duty, angle = (log[name].to_numpy() for name in ("time_s", "duty", "angle_deg"))
+    content = record_content(time, angle, limp_home_deg=home, stops_deg=prior.stops_deg)
     questions = open_questions(content, swing=prior.swing, pairs=entangled(fit.report))
     # The report names correlated pairs, too; here each comes with its remedy.
     of_fit = (finding for finding in fit.findings if finding.code != "correlated")
@@ -205,7 +204,8 @@ def identify_throttle(
     if limp_home_deg is None:
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    findings = unique((*of_fit, *_carried_over(fit.train, tested), *read, *stops, *questions))
+    against = moves_against(time, duty, angle, (closed_deg, open_deg))
+    findings = unique((*against, *of_fit, *_carried_over(fit.train, tested), *read, *stops, *questions))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 

@@ -9,6 +9,9 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
+from mgdd.presets.meant import ThrottleLike, throttle_model_of
+from mgdd.results import Fit
+from mgdd.signals.model import SampledModel
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
@@ -22,8 +25,8 @@ class OnlineUpdate:
 
     Parameters
     ----------
-    model : PseudoWiener
-        Start, of kind ``pw_r``.
+    model : PseudoWiener, or Fit, its model, Throttle, Preset, str or path-like
+        Start, of kind ``pw_r``; PW-R with the groups of anything else.
     method : {"recursive_least_squares", "window", "gradient"}
         Recursive least squares with gates; a sliding window of 100 points with a prior; a normalised gradient.
     free : sequence of str, optional
@@ -64,7 +67,7 @@ class OnlineUpdate:
 
     def __init__(
         self,
-        model: PseudoWiener,
+        model: ThrottleLike | Fit | SampledModel,
         *,
         method: str = "recursive_least_squares",
         free: Sequence[str] | None = None,
@@ -75,11 +78,13 @@ class OnlineUpdate:
         iterate_every: int = 50,
         adaptation_gain: float = 0.05,
     ) -> None:
-        if model.kind != "pw_r":
-            raise ParameterError(f"model is a {model.kind}: must be a pw_r")
-        self._start = model
+        meant = throttle_model_of(model)
+        start = meant if isinstance(meant, PseudoWiener) else PseudoWiener.of_throttle(meant)
+        if start.kind != "pw_r":
+            raise ParameterError(f"model is a {start.kind}: must be a pw_r")
+        self._start = start
         names = list(free if free is not None else (_ALL if method == "window" else _ALL[1:3]))
-        values = dict(model.parameters)
+        values = dict(start.parameters)
         self._core: _core.identify.RecursivePwR | _core.identify.WindowPwR | _core.identify.GradientPwR
         if method == "recursive_least_squares":
             self._core = _core.identify.RecursivePwR(

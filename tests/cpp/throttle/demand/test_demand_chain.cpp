@@ -83,12 +83,22 @@ TEST(Demand, AMeasuredPressureCountsUpToTheHighestRatioAndTheWantedOneBeyond) {
   }
 }
 
-TEST(Demand, AStandingEngineWantsWhatItWouldAtTheFirstSpeed) {
+TEST(Demand, BelowTheMapTheTorqueOfItsFirstSpeedIsMadeAtTheTrueOne) {
   const DemandModel model(odd_chain());
-  const Demand still = model.steady(30.0, 0.0), first = model.steady(30.0, 800.0);
-  EXPECT_EQ(still.opening_deg, first.opening_deg);
-  EXPECT_EQ(still.air_kg_per_s, first.air_kg_per_s);
-  EXPECT_GT(first.opening_deg, 1.0);
+  const double asked = model.steady(30.0, odd_chain().pedal_map.speed_rpm.front()).torque_nm;
+  for (const double speed : {300.0, 450.0, 640.0}) {
+    const Demand wanted = model.steady(30.0, speed);
+    EXPECT_EQ(wanted.torque_nm, asked);
+    EXPECT_NEAR(odd_chain().torque.torque_nm(wanted.air_kg_per_s, speed), asked, 1e-9) << speed;
+  }
+}
+
+TEST(Demand, AStandingEngineWantsWhatOneWouldThatIsStarted) {
+  const DemandModel model(odd_chain());
+  const Demand still = model.steady(30.0, 0.0), started = model.steady(30.0, 300.0);
+  EXPECT_EQ(still.opening_deg, started.opening_deg);
+  EXPECT_EQ(still.air_kg_per_s, started.air_kg_per_s);
+  EXPECT_GT(started.opening_deg, 0.5);
 }
 
 TEST(Demand, TheWidestReferenceIsNeverPassed) {

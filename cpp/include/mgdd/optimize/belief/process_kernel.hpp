@@ -19,6 +19,7 @@ struct ProcessGuide {
   double sign = 1.0;       ///< -1 where less is better
   double factor_sd = 0.5;  ///< of its factor about the one it counts by
   double place_sd = 0.2;   ///< of its place, in ranges
+  double secant = 0.0;     ///< half of what its slopes over inputs are taken across, in ranges; 0 for tangents
 };
 
 inline constexpr int most_kept = 500;  ///< readings of a process

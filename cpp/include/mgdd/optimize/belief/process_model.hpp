@@ -136,7 +136,8 @@ class ProcessModel {
 
  private:
   static constexpr int evidence_readings = 60, more_readings = 40;
-  static constexpr double few_readings = 2.0;  // over degrees of freedom
+  static constexpr double most_trusted = 81.0;  // of what a variance is multiplied by: nine standard deviations
+  static constexpr double few_readings = 2.0;   // over degrees of freedom
   // Logarithms: bend, noise over bend, size of the rest over bend, lengths; how fast slopes and level wander, over the
   // expected; what the guide counts by.
   using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6 + max_inputs, 1>;

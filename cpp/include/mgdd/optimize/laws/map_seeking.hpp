@@ -189,6 +189,7 @@ class MapSeeking {
   void search(std::span<Place> places) noexcept;
   void know_cells() noexcept;
   void know_edges(std::span<const Place> places) noexcept;
+  void know_likeliest(Place& place, int from) noexcept;
   void choose_safe(std::span<Place> places) noexcept;
   int visits_of(std::size_t c, std::span<int> out) const noexcept;
   int least_unsafe(std::span<const Place> places) const noexcept;

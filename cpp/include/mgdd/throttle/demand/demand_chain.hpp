@@ -76,7 +76,7 @@ class DemandModel {
   const DemandChain& chain() const noexcept { return chain_; }
   const PlateOpening& plate() const noexcept { return plate_; }
 
-  /// Below the first speed of the pedal map, as at that speed.
+  /// Below the first speed of the pedal map the torque that is wanted there; below 300 rpm all is as at these.
   Demand steady(double pedal_percent, double speed_rpm) const noexcept;
   /// The same without the opening.
   Demand wanted(double pedal_percent, double speed_rpm) const noexcept;

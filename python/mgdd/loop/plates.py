@@ -1,0 +1,115 @@
+"""What a loop moves as a plate: a throttle, a fit of one, or a plant of the user's own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, cast, runtime_checkable
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._arguments import shown
+from mgdd.errors import ParameterError
+from mgdd.identify import load_throttle_model
+from mgdd.identify.throttle.fits import KINDS
+from mgdd.io.parameters import ParameterFile
+from mgdd.presets.meant import ThrottleLike, moving_throttle_of, throttle_model_of
+from mgdd.results import Fit
+from mgdd.signals.model import SampledModel
+from mgdd.throttle import PseudoWiener, Throttle
+
+
+@runtime_checkable
+class PlatePlant(Protocol):
+    """A plate of the user's own: any object with these two; `copy.deepcopy` gives a fresh one for every run."""
+
+    @property
+    def output(self) -> float:
+        """Angle now [deg]."""
+        ...
+
+    def step(self, duty: float, /) -> object:
+        """Let a duty act for one sample; what is returned does not count."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A plant of the loop, and the fitted model that it was made of: that one says nothing of torques and currents."""
+
+    plant: Throttle | PseudoWiener | PlatePlant
+    model: Any = None
+
+    def delay_samples(self, given: int | None, sample_s: float) -> int:
+        """Return the whole samples of delay that are given, else those of the fit, else one."""
+        if given is not None:
+            return given
+        numbers: Mapping[str, float] = getattr(self.model, "parameters", {})
+        if "delay_samples" not in numbers:
+            return 1
+        own = numbers.get("sample_s", getattr(self.model, "sample_s", sample_s))
+        return int(np.floor(numbers["delay_samples"] * own / sample_s + 0.5))
+
+    def require_torques(self, **signals: Any) -> None:
+        """Refuse a torque or a supply on what only a `Throttle` has them."""
+        for name, value in signals.items():
+            if value is None or (self.model is None and isinstance(self.plant, Throttle)):
+                continue
+            remedy = (
+                "a fit knows neither: its .model.to_throttle(...) states them" if self.model else "put it into step"
+            )
+            raise ParameterError.of(name, value, f"left out where the plant is not a Throttle; {remedy}")
+
+    def moving(self, sample_s: float, start_deg: float) -> PlatePlant:
+        """Return a plant without sensors, at rest at an angle where it is a model."""
+        if isinstance(self.plant, PseudoWiener):
+            low, high = (self.plant.parameters[name] for name in ("closed_deg", "open_deg"))
+            return _ModelPlate(self.plant.at_sample(sample_s), float(np.clip(start_deg, low, high)))
+        return cast("PlatePlant", self.plant)
+
+
+def plate_of(given: Any) -> Plate:
+    """Return the plant that is meant by a throttle, a preset, a fit, its model, the file of either, or an own plant."""
+    if given is None or isinstance(given, Plate):
+        return given or Plate(Throttle())
+    meant = model_of(given)
+    if isinstance(meant, PseudoWiener):  # its delay is the loop's
+        return Plate(meant.replace(delay_samples=0.0), meant)
+    if isinstance(meant, PlatePlant) and not isinstance(meant, type):
+        return Plate(meant)
+    if callable(getattr(meant, "step", None)) and not isinstance(meant, Throttle):
+        raise ParameterError(
+            f"throttle = {shown(given)}: must have `output`, the angle now [deg], beside step(duty)", field="throttle"
+        )
+    return Plate(*moving_throttle_of(meant))
+
+
+def model_of(given: Any) -> Any:
+    """Return the throttle of a preset or its file, the model of a fit or its file, and everything else as it is."""
+    if isinstance(given, Plate):
+        return given.model or given.plant
+    if isinstance(given, str | os.PathLike) and os.fspath(given).endswith(".toml"):
+        kind = ParameterFile.read(given).kind
+        if kind in KINDS:
+            return load_throttle_model(given)
+    return throttle_model_of(given)
+
+
+class _ModelPlate:
+    """A pseudo-Wiener model sample by sample."""
+
+    def __init__(self, model: PseudoWiener, start_deg: float) -> None:
+        self._stepper = _core.throttle.PseudoWienerStepper(model.kind, dict(model.parameters), **model._options)
+        self._state = self._stepper.at_rest(start_deg)
+
+    @property
+    def output(self) -> float:
+        return float(self._stepper.output(self._state))
+
+    def step(self, duty: float, /) -> None:
+        self._state = self._stepper.advance(self._state, duty)
+
+
+PlateLike = ThrottleLike | Fit | SampledModel | PlatePlant | Plate
