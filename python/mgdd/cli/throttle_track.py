@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,7 @@ from mgdd.cli.options import option
 from mgdd.cli.output import emit, warn
 from mgdd.cli.ranges import number_pairs
 from mgdd.cli.throttle import DEFAULT_PRESET, add_preset, add_throttle, changes_of, known_only
-from mgdd.errors import ParameterError
+from mgdd.errors import DataError, ParameterError
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
@@ -45,6 +46,7 @@ def _add_track(parser: Any) -> None:
            "(stiction goes with it)")  # fmt: skip
     _RUN.add(group)
     option(parser, "--model FIT.toml", "what the controller knows: a fit of mgdd throttle identify (default: preset)")
+    option(parser, "--numbers FILE.json", "of the controller: what mgdd throttle tune --json has printed")
     option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
 
 
@@ -73,6 +75,7 @@ def _track(args: argparse.Namespace) -> None:
     controller, doubts = tuned_with_doubts(
         args.controller,
         model,
+        numbers=None if args.numbers is None else _numbers_in(args.numbers, args.controller),
         sample_s=reference.sample_s,
         delay_samples=None if args.model is not None else plate.delay_samples(how["delay_samples"], reference.sample_s),
         noise_deg=how["noise_deg"],
@@ -130,6 +133,18 @@ def _plate_in(args: argparse.Namespace) -> tuple[Plate, str]:
     given = args.preset or DEFAULT_PRESET
     plate = plate_of(given)
     return plate, Path(given).stem if plate.model is not None else presets.load(given).name
+
+
+def _numbers_in(file: str, kind: str) -> dict[str, float]:
+    """Read what `mgdd throttle tune --json` has printed for that kind."""
+    try:
+        found = json.loads(Path(file).read_text(encoding="utf-8"))
+        own, numbers = found["controller"], {str(name): float(value) for name, value in found["numbers"].items()}
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise DataError(f"{file}: not what mgdd throttle tune --json prints: {error!r}") from error
+    if own != kind:
+        raise ParameterError.of("--numbers", file, f"of --controller {kind}: these are of {own}")
+    return numbers
 
 
 COMMANDS = {"track": (_add_track, _track), "tune": (_add_tune, _tune)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, cast, runtime_checkable
 
@@ -15,7 +14,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.fits import KINDS
 from mgdd.io.parameters import ParameterFile
-from mgdd.presets.meant import ThrottleLike, moving_throttle_of, throttle_model_of
+from mgdd.presets.meant import ThrottleLike, moving_throttle_of, throttle_model_of, whole_delay_of
 from mgdd.results import Fit
 from mgdd.signals.model import SampledModel
 from mgdd.throttle import PseudoWiener, Throttle
@@ -44,13 +43,8 @@ class Plate:
 
     def delay_samples(self, given: int | None, sample_s: float) -> int:
         """Return the whole samples of delay that are given, else those of the fit, else one."""
-        if given is not None:
-            return given
-        numbers: Mapping[str, float] = getattr(self.model, "parameters", {})
-        if "delay_samples" not in numbers:
-            return 1
-        own = numbers.get("sample_s", getattr(self.model, "sample_s", sample_s))
-        return int(np.floor(numbers["delay_samples"] * own / sample_s + 0.5))
+        own = whole_delay_of(self.model, sample_s)
+        return given if given is not None else 1 if own is None else own
 
     def require_torques(self, **signals: Any) -> None:
         """Refuse a torque or a supply on what only a `Throttle` has them."""

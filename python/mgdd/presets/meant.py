@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -90,6 +91,15 @@ def moving_throttle_of(given: Any) -> tuple[Throttle, Any]:
     if hasattr(meant, "to_throttle"):
         return meant.to_throttle(**_OF_NO_MATTER), meant
     return throttle_of(meant, "a Throttle, a first-principle fit of one"), None
+
+
+def whole_delay_of(model: Any, sample_s: float) -> int | None:
+    """Return the delay of a fitted model in seconds, to the nearest sample; None where it has none."""
+    numbers: Mapping[str, float] = getattr(model, "parameters", {})
+    if "delay_samples" not in numbers:
+        return None
+    own = numbers.get("sample_s", getattr(model, "sample_s", sample_s))
+    return math.floor(numbers["delay_samples"] * own / sample_s + 0.5)
 
 
 def throttle_model_of(given: Any) -> Any:

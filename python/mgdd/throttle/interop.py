@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
-from mgdd.presets.meant import ThrottleLike, throttle_model_of, throttle_of
+from mgdd.presets.meant import ThrottleLike, moving_throttle_of, throttle_model_of, whole_delay_of
+from mgdd.results import Fit
+from mgdd.signals.model import SampledModel
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 
 # The order of the core's state; angles of motor and gear at plate scale, then of the plate.
@@ -22,7 +24,7 @@ _ANGLE = _STATES.index("plate_angle_deg")
 
 
 def to_iosystem(
-    model: ThrottleLike | PseudoWiener,
+    model: ThrottleLike | Fit | SampledModel,
     *,
     sample_s: float = 1e-3,
     step_s: float = 1e-4,
@@ -33,8 +35,8 @@ def to_iosystem(
 
     Parameters
     ----------
-    model : Throttle, Preset, str or path-like, or PseudoWiener
-        The plant, or a pseudo-Wiener model of it.
+    model : Throttle, Preset, str or path-like, Fit or its model
+        The plant, or a model of it. The delay of a first-principle fit is whole samples, its current has no unit.
     sample_s : float
         Time between samples, the time base of the system [s]; the duty holds in between.
     step_s : float
@@ -51,7 +53,8 @@ def to_iosystem(
         Time comes last in its arrays, as everywhere in python-control.
     ndarray
         The state at rest. Of a Throttle angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear,
-        then angle, speed and bristle of the plate; of a PseudoWiener the states of its block in deg, s and duty.
+        then angle, speed and bristle of the plate, of a fit the duties that wait; of a PseudoWiener the states of its
+        block in deg, s and duty.
 
     Raises
     ------
@@ -73,23 +76,30 @@ def to_iosystem(
     ...     assert system.dt == 0.001
     ...     assert rest.round(6).tolist() == [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
     """
-    meant = throttle_model_of(model)
-    plant_model: Throttle | PseudoWiener = meant if isinstance(meant, PseudoWiener) else throttle_of(meant)
+    meant, waiting = throttle_model_of(model), 0
+    plant_model: Throttle | PseudoWiener
+    if isinstance(meant, PseudoWiener):
+        plant_model = meant
+    else:
+        plant_model, fit = moving_throttle_of(meant)
+        waiting = whole_delay_of(fit, sample_s) or 0
     try:
         import control
     except ImportError as error:
         raise ImportError("to_iosystem needs python-control: pip install 'mgdd[control]'") from error
-    rest = _at_rest(plant_model, start_deg)
+    rest = np.concatenate([_at_rest(plant_model, start_deg), np.zeros(waiting)])
     stepper: Any
     if isinstance(plant_model, PseudoWiener):
         stepper = _stepper(plant_model.at_sample(sample_s))
         states = [f"state_{i}" for i in range(rest.size)]
     else:
         stepper = _core.throttle.Stepper(plant_model, sample_s=sample_s, step_s=step_s)
-        states = list(_STATES)
+        states = [*_STATES, *(f"duty_{waiting - i}_samples_ago" for i in range(waiting))]
+    moving = rest.size - waiting
 
     def update(_time: float, state: Any, inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
-        return np.asarray(stepper.advance(np.asarray(state, dtype=np.float64), float(np.ravel(inputs)[0])))
+        column = np.concatenate([np.asarray(state, dtype=np.float64), np.ravel(inputs)[:1]])
+        return np.concatenate([stepper.advance(column[:moving], float(column[moving])), column[moving + 1 :]])
 
     def output(_time: float, state: Any, _inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
         column = np.asarray(state, dtype=np.float64)

@@ -14,7 +14,7 @@ from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.loop import track, track_many, tune_controller, tuned_controller
-from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle, to_iosystem
+from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle
 
 FIT = FirstPrincipleModel(
     parameters={
@@ -133,7 +133,6 @@ class Lost(Leaf):
         (lambda: tune_controller("pid", []), ParameterError, "at least one"),
         (lambda: simulate_throttle(FIT, 0.3, supply_v=11.0), ParameterError, "to_throttle"),
         (lambda: simulate_throttle(FIT, 0.3, bridge="open"), ParameterError, "bridge"),
-        (lambda: to_iosystem(FIT), ParameterError, "to_throttle"),  # type: ignore[arg-type]
         (lambda: track(PID, "step:40:42", throttle="P9.toml"), (DataError, FileNotFoundError), "P9"),
     ],
 )
@@ -160,3 +159,20 @@ def test_the_command_line_takes_a_fit_where_it_takes_a_preset(
     assert payloads[2]["start_angle_deg"] == 9.0
     assert main(["throttle", "tune", "--preset", str(file), "--set", "coulomb_nm=1"]) == 2
     assert "--set" in capsys.readouterr().err
+
+
+def test_the_command_line_tracks_with_what_it_tuned(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file, numbers = tmp_path / "own.toml", tmp_path / "pid.json"
+    file.write_text(FIT.to_toml())
+    own = ["--preset", str(file), "--controller", "pid", "--json"]
+    assert main(["throttle", "tune", *own, "--budget", "30", "--throttles", "2"]) == 0
+    numbers.write_text(capsys.readouterr().out)
+    assert main(["throttle", "track", *own, "--numbers", str(numbers), "--seed", "3"]) == 0
+    tracked = json.loads(capsys.readouterr().out)
+    tuned = tuned_controller("pid", FIT, numbers=json.loads(numbers.read_text())["numbers"])
+    assert tracked["mse_deg2"] == float(track(tuned, "step:40:42", throttle=FIT, seed=3)["mse_deg2"])
+    assert main(["throttle", "track", "--controller", "guided", "--numbers", str(numbers)]) == 2
+    assert "these are of pid" in capsys.readouterr().err
+    numbers.write_text("{}")
+    assert main(["throttle", "track", *own, "--numbers", str(numbers)]) == 2
+    assert "tune --json" in capsys.readouterr().err

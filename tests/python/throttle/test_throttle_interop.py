@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.signals import amplitude_random_steps
 from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle, to_iosystem
 
@@ -81,3 +82,21 @@ def test_the_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(ImportError, match=r"pip install 'mgdd\[control\]'"):
         to_iosystem(Throttle())
+
+
+def test_a_fit_responds_as_its_model_runs_with_its_delay() -> None:
+    control = pytest.importorskip("control")
+    numbers = {**FirstPrincipleModel().parameters, "tau_s": 0.05, "delay_samples": 3.0}
+    model = FirstPrincipleModel(parameters=numbers, substeps=20)
+    signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.3, hold_s=0.05)
+    time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
+    ours = model.simulate(signal, initial_state={"angle_deg": 20.0})["angle_deg"].to_numpy()
+    system, start = to_iosystem(model, start_deg=20.0)
+    response = control.input_output_response(system, time, duty, start)
+    assert np.ptp(ours) > 5.0
+    assert start.size == 10
+    assert np.abs(response.outputs - ours).max() < 0.005 * np.ptp(ours)
+    late = to_iosystem(FirstPrincipleModel(parameters=numbers | {"delay_samples": 0.0}), start_deg=20.0)
+    assert np.abs(control.input_output_response(late[0], time, duty, late[1]).outputs - ours).max() > 0.02 * np.ptp(
+        ours
+    )
