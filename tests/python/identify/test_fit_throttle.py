@@ -15,7 +15,7 @@ from mgdd.identify.throttle.first_principle_problem import regression_start
 from mgdd.identify.throttle.nuisances import TYPICAL_SHARE, delay_weights
 from mgdd.identify.throttle.whole_delay import FINE
 from mgdd.io import throttle_log
-from mgdd.loop import track, tuned_controller
+from mgdd.loop import VirtualThrottle, track, tuned_controller
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import Model
 from mgdd.throttle import simulate_throttle
@@ -144,11 +144,11 @@ def test_the_throttle_of_a_model_moves_as_it_does(groups, least):
     assert 100.0 * (1.0 - np.linalg.norm(own - angle) / np.linalg.norm(angle - angle.mean())) > least
 
 
-def test_a_model_is_no_throttle_until_the_rest_is_known():
+def test_a_model_is_no_throttle_with_currents_until_the_rest_is_known():
     fit = fit_plain(two_sided_log())
     for given in (fit, fit.model):
         with pytest.raises(ParameterError, match=r"\.to_throttle\(resistance_ohm="):
-            simulate_throttle(given, [0.1, 0.2])
+            VirtualThrottle(given)
     throttle = fit.model.to_throttle(resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=0.383)
     run = track(tuned_controller("guided", throttle), np.repeat([20.0, 60.0], 500), throttle=throttle)
     assert abs(float(run["angle_deg"][-1]) - 60.0) < 0.5
