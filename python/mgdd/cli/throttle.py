@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,10 +20,9 @@ from mgdd.errors import DataError, ParameterError, argument, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.table import Place, read_table
-from mgdd.loop.plates import model_of
+from mgdd.loop.plates import Plate, model_of, plate_of
 from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
-from mgdd.presets.preset import Preset
 from mgdd.signals.even_grid import even_step
 from mgdd.throttle import DemandChain, Throttle, simulate_throttle
 from mgdd.throttle.simulation import step_summary
@@ -37,7 +37,7 @@ LOG = Options(
     "travel_deg", "start_s", "stop_s", "sample_s", "delimiter", "decimal", "sheet",
 )  # fmt: skip
 
-DEFAULT_PRESET = "P1"
+_DEFAULT_PRESET = "P1"
 
 
 def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
@@ -47,7 +47,7 @@ def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
 
 def add_preset(group: Any) -> None:
     """Add the preset of a throttle."""
-    what = f"{', '.join(presets.available('throttle'))}, a TOML file of one, or of a fit (default: {DEFAULT_PRESET})"
+    what = f"{', '.join(presets.available('throttle'))}, a TOML file of one, or of a fit (default: {_DEFAULT_PRESET})"
     option(group, "--preset NAME_OR_FILE.toml", what)
 
 
@@ -58,15 +58,16 @@ def add_throttle(parser: argparse.ArgumentParser) -> None:
     option(group, "--set FIELD=VALUE ...", "any field of the throttle, repeatable, for example coulomb_nm=0.3")
 
 
-def preset_of(args: argparse.Namespace) -> Preset:
-    """Load the preset of a throttle; it refuses to be an engine when it is asked for its throttle."""
-    return presets.load(args.preset or DEFAULT_PRESET)
-
-
-def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
-    """Make the throttle of a preset and the fields over it."""
-    preset = preset_of(args)
-    return preset.throttle.replace(**changes_of(args, Throttle.fields())), preset.name
+def plate_in(args: argparse.Namespace) -> tuple[Plate, str]:
+    """Load what ``--preset`` names, a preset or a fit of `mgdd throttle identify`, with the fields of ``--set``."""
+    given = args.preset or _DEFAULT_PRESET
+    plate = plate_of(given)
+    changes = changes_of(args, Throttle.fields()) if "set" in args else {}
+    if isinstance(plate.plant, Throttle) and plate.model is None:
+        return replace(plate, plant=plate.plant.replace(**changes)), presets.load(given).name
+    if changes:
+        raise ParameterError.of("--set", args.set, "left out with a fit: it goes with a preset")
+    return plate, Path(given).stem
 
 
 def changes_of(args: argparse.Namespace, fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -128,13 +129,8 @@ def _add_simulate(parser: Any) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
-    meant = model_of(args.preset or DEFAULT_PRESET)
-    if isinstance(meant, Throttle):
-        meant, preset = throttle_of(args)
-    elif args.set:
-        raise ParameterError.of("--set", args.set, "left out with a fit: it goes with a preset")
-    else:
-        preset = Path(args.preset).stem
+    plate, preset = plate_in(args)
+    meant = model_of(plate)
     timed, signals = _TIME.given(args), _SIGNALS.given(args)
     if args.input is None:
         given = {"duty": args.duty, **timed, **signals}

@@ -11,11 +11,12 @@ from mgdd import identify, signals
 from mgdd.cli.from_library import Options, as_option, default_of, shown
 from mgdd.cli.options import option
 from mgdd.cli.output import check_file, emit, warn, wrote
-from mgdd.cli.throttle import LOG, add_throttle, log_in, throttle_of
+from mgdd.cli.throttle import LOG, add_throttle, log_in, plate_in
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify.throttle.excitation import EXCITATIONS
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io.files import write_whole_text
+from mgdd.loop.plates import model_of
 from mgdd.optimize import FitOptions
 from mgdd.presets.preset import Preset
 from mgdd.throttle import Throttle
@@ -186,7 +187,8 @@ def _defaults_of(name: str) -> dict[str, str]:
 
 
 def _excite(args: argparse.Namespace) -> None:
-    throttle, preset = throttle_of(args)
+    plate, preset = plate_in(args)
+    prior = model_of(plate)
     limits = _CHECK.given(args)
     designed = _DESIGN.given(args)
     sample_s = _DESIGN.of(args)["sample_s"]
@@ -203,11 +205,11 @@ def _excite(args: argparse.Namespace) -> None:
             raise ParameterError(
                 f"{as_option(others[0])} acts on a signal of your own only: give --offset and --amplitude too"
             )
-        signal, check = identify.design_excitation(args.kind, throttle, **designed, **limits)
+        signal, check = identify.design_excitation(args.kind, prior, **designed, **limits)
     else:
         make = getattr(signals, args.kind)
         signal = make(offset=args.offset, amplitude=args.amplitude, sample_s=sample_s, **given)
-        check = identify.check_excitation(signal, throttle, **limits)
+        check = identify.check_excitation(signal, prior, **limits)
         if not check.passed:
             raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}

@@ -9,17 +9,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mgdd import presets
-from mgdd.cli.from_library import Options
+from mgdd.cli.from_library import Options, named_options
 from mgdd.cli.options import option
 from mgdd.cli.output import emit, warn
 from mgdd.cli.ranges import number_pairs
-from mgdd.cli.throttle import DEFAULT_PRESET, add_preset, add_throttle, changes_of, known_only
+from mgdd.cli.throttle import add_preset, add_throttle, known_only, plate_in
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
-from mgdd.loop.plates import Plate, plate_of
 from mgdd.loop.track import FIGURES, step_times_us
 from mgdd.loop.tune import with_stiction
 from mgdd.loop.tuned import tuned_with_doubts
@@ -61,7 +59,7 @@ def _add_controller(parser: argparse.ArgumentParser) -> None:
 
 
 def _track(args: argparse.Namespace) -> None:
-    plate, preset = _plate_in(args)
+    plate, preset = plate_in(args)
     numbers = [name for name, field in Throttle.fields().items() if "choices" not in field]
     scales = with_stiction(known_only(number_pairs(args.plant_scale, "--plant-scale"), numbers, "--plant-scale"))
     known = plate.plant
@@ -81,7 +79,8 @@ def _track(args: argparse.Namespace) -> None:
         noise_deg=how["noise_deg"],
     )
     warn(*doubts)
-    run = track(controller, reference, throttle=plant, **_AIR.given(args), **how)
+    with named_options(airflow_torque_nm="airflow"):
+        run = track(controller, reference, throttle=plant, **_AIR.given(args), **how)
     p50, p999 = step_times_us(controller, run)
     payload = {
         "controller": args.controller,
@@ -100,12 +99,8 @@ def _track(args: argparse.Namespace) -> None:
 
 
 def _tune(args: argparse.Namespace) -> None:
-    plate, preset = _plate_in(args)
-    changes = changes_of(args, Throttle.fields())
-    if changes and (plate.model is not None or not isinstance(plate.plant, Throttle)):
-        raise ParameterError.of("--set", args.set, "left out with a fit: it goes with a preset")
-    plant: Any = plate.plant.replace(**changes) if changes and isinstance(plate.plant, Throttle) else plate
-    found = tune_controller(args.controller, plant, **_TUNE.given(args))
+    plate, preset = plate_in(args)
+    found = tune_controller(args.controller, plate, **_TUNE.given(args))
     payload = {
         "controller": found.kind,
         "preset": preset,
@@ -126,13 +121,6 @@ def _tune(args: argparse.Namespace) -> None:
         f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, {delay})",
     ]
     emit(args, payload, text=text)
-
-
-def _plate_in(args: argparse.Namespace) -> tuple[Plate, str]:
-    """Load the plant that ``--preset`` names: a preset, or a fit of `mgdd throttle identify`."""
-    given = args.preset or DEFAULT_PRESET
-    plate = plate_of(given)
-    return plate, Path(given).stem if plate.model is not None else presets.load(given).name
 
 
 def _numbers_in(file: str, kind: str) -> dict[str, float]:

@@ -14,7 +14,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.fits import KINDS
 from mgdd.io.parameters import ParameterFile
-from mgdd.presets.meant import ThrottleLike, moving_throttle_of, throttle_model_of, whole_delay_of
+from mgdd.presets.meant import ThrottleLike, moving_throttle_of, throttle_model_of, unknown_to_a_fit, whole_delay_of
 from mgdd.results import Fit
 from mgdd.signals.model import SampledModel
 from mgdd.throttle import PseudoWiener, Throttle
@@ -51,10 +51,9 @@ class Plate:
         for name, value in signals.items():
             if value is None or (self.model is None and isinstance(self.plant, Throttle)):
                 continue
-            remedy = (
-                "a fit knows neither: its .model.to_throttle(...) states them" if self.model else "put it into step"
-            )
-            raise ParameterError.of(name, value, f"left out where the plant is not a Throttle; {remedy}")
+            if self.model is not None:
+                raise unknown_to_a_fit(name, value)
+            raise ParameterError.of(name, value, "left out: a plant of your own has it in its step")
 
     def moving(self, sample_s: float, start_deg: float) -> PlatePlant:
         """Return a plant without sensors, at rest at an angle where it is a model."""

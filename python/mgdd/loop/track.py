@@ -221,7 +221,7 @@ def column_of(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]
 
 
 class _OwnPlate:
-    """A plant that is no throttle, with white noise on its angle."""
+    """A plant that is not a `Throttle`, with white noise on its angle."""
 
     _still: Mapping[str, float] = MappingProxyType({"supply_v": math.nan})
 

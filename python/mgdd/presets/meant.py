@@ -10,7 +10,7 @@ from typing import Any
 from mgdd._arguments import shown
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.throttle import Throttle
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, argument
 from mgdd.presets.preset import Preset, available, load
 from mgdd.results import Fit
 
@@ -91,6 +91,12 @@ def moving_throttle_of(given: Any) -> tuple[Throttle, Any]:
     if hasattr(meant, "to_throttle"):
         return meant.to_throttle(**_OF_NO_MATTER), meant
     return throttle_of(meant, "a Throttle, a first-principle fit of one"), None
+
+
+def unknown_to_a_fit(name: str, value: Any) -> ParameterError:
+    """Return the refusal of what a fit of duty and angle says nothing of; its remedy serves Python and the shell."""
+    way = "its model's to_throttle(...), or mgdd throttle identify --throttle FILE.toml, makes a throttle of it"
+    return ParameterError.of(argument(name), value, f"left out with a fit, which knows duty and angle only; {way}")
 
 
 def whole_delay_of(model: Any, sample_s: float) -> int | None:

@@ -138,7 +138,11 @@ class Preset(Parameters):
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> Preset:
         """Make the preset of a file; what is missing and has a default keeps it."""
-        tables = _OF_KIND.get(file.kind, ())
+        if file.kind not in _OF_KIND:
+            kinds = " or ".join(map(repr, _OF_KIND))
+            hint = "mgdd.identify.load_throttle_model reads a fit of a throttle"
+            raise DataError(f"{file.origin}: kind = {file.kind!r}: must be {kinds}; {hint}")
+        tables = _OF_KIND[file.kind]
         file.expect(
             kinds=tuple(_OF_KIND), tables=(*tables[:1], *(f"{t}?" for t in tables[1:])), notes=("name", "title")
         )

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.presets.meant import ThrottleLike, throttle_model_of, throttle_of
+from mgdd.presets.meant import ThrottleLike, throttle_model_of, throttle_of, unknown_to_a_fit
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import SampledModel, columns_of, is_timed
@@ -159,8 +159,7 @@ def _run_of_fit(
     """Run what a log in duty and angle has shown."""
     for name, value in stated.items():
         if value is not None:
-            bound = "left out with a fit, which knows duty and angle only; its .model.to_throttle(...) is a Throttle"
-            raise ParameterError.of(name, value, bound)
+            raise unknown_to_a_fit(name, value)
     if np.ndim(start_deg):
         raise ParameterError.of("start_deg", start_deg, "one angle with a fit")
     start = {} if start_deg is None else {"angle_deg": float(start_deg)}

@@ -1,104 +1,18 @@
-// A search for a map on a spark engine of its own: torque over spark advance, held back by knock, and by exhaust heat.
+// A search for a map on a spark engine of its own.
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/laws/map_seeking.hpp"
 #include "support/no_alloc.hpp"
+#include "support/spark_engine.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
-using test_support::AllocationCounter;
-
-constexpr double knock_limit = 1.0;
-
-struct Plant {
-  double octane = 0.0;  // degrees of spark by which knock comes later
-  double mbt_shift = 0.0, scale = 1.0;
-  double motored = 0.0;  // least knock signal, which says nothing of the spark
-
-  double mbt(const Inputs& at) const { return 14.0 + 6.0 * (at[0] - 1.0) - 9.0 * at[1] + mbt_shift; }
-  double torque(const Inputs& at, double spark) const {
-    const double off = spark - mbt(at);
-    return scale * at[1] * (200.0 - 0.11 * off * off - 0.0012 * off * off * off);
-  }
-  double knock(const Inputs& at, double spark) const {
-    return std::max(motored,
-                    0.25 * std::exp((spark - 20.0 - octane + 22.0 * (at[1] - 0.5) - 2.0 * (at[0] - 2.0)) / 7.0));
-  }
-  // Best spark under the knock limit.
-  double best(const Inputs& at) const {
-    double spark = -10.0;
-    for (double tried = -10.0; tried <= 45.0; tried += 0.01)
-      if (knock(at, tried) <= knock_limit && torque(at, tried) > torque(at, spark)) spark = tried;
-    return spark;
-  }
-};
-
-Inputs point(double krpm, double load) {
-  Inputs out(2);
-  out << krpm, load;
-  return out;
-}
-
-Surface surface_of(const Plant& plant, bool knock) {
-  const std::vector<double> speeds{1.0, 2.0, 3.0, 4.0}, loads{0.3, 0.6, 0.9};
-  std::vector<double> sparks, values;
-  for (double spark = -10.0; spark <= 45.0; spark += 2.5)
-    sparks.push_back(spark);
-  for (const double speed : speeds) {
-    for (const double load : loads) {
-      for (const double spark : sparks)
-        values.push_back(knock ? plant.knock(point(speed, load), spark) : plant.torque(point(speed, load), spark));
-    }
-  }
-  return Surface({speeds, loads, sparks}, values);
-}
-
-MapSeekingSettings settings(std::uint64_t seed, const Plant* guide) {
-  MapSeekingSettings s;
-  s.space = {scalar_input(2.0), scalar_input(-10.0), scalar_input(45.0)};
-  s.context = {{"speed_krpm", 1.0, 4.0}, {"load", 0.3, 0.9}};
-  s.axes = {{1.0, 2.0, 3.0, 4.0}, {0.3, 0.6, 0.9}};
-  s.limits = {{"knock", knock_limit}};
-  s.seed = seed;
-  if (guide != nullptr) {
-    s.guide = {surface_of(*guide, false)};
-    s.limit_guides = {surface_of(*guide, true)};
-  }
-  return s;
-}
-
-void read(MapSeeking& search, const Plant& plant, const Inputs& at, const Inputs& input, std::uint64_t draw) {
-  const double noise = 0.2 * random::normal(9, 1, draw), knock_noise = 0.01 * random::normal(9, 2, draw);
-  const double torque = plant.torque(at, input[0]) + noise;
-  const std::array<double, 1> knock{plant.knock(at, input[0]) + knock_noise};
-  ASSERT_EQ(search.tell(at, input, {.components = {&torque, 1}, .limits = knock}), TellStatus::accepted);
-}
-
-struct Judged {
-  double worst_loss = 0.0, worst_knock = 0.0;
-};
-
-Judged visited(MapSeeking& search, const Plant& plant, int visits, std::uint64_t seed) {
-  Judged out;
-  for (int k = 0; k < visits; ++k) {
-    const MapSeeking::Visit visit = search.suggest();
-    out.worst_knock = std::max(out.worst_knock, plant.knock(visit.context, visit.input[0]));
-    read(search, plant, visit.context, visit.input, 1000 * seed + static_cast<std::uint64_t>(k));
-  }
-  for (std::size_t c = 0; c < search.cells(); ++c) {
-    const Inputs at = search.cell(c);
-    const double own = search.best(c).input[0];
-    out.worst_loss = std::max(out.worst_loss, plant.torque(at, plant.best(at)) - plant.torque(at, own));
-  }
-  return out;
-}
+using namespace test_support;
 
 TEST(MapSeeking, TenVisitsAndARoughModelMakeTheMapOfAnotherEngine) {
   const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
@@ -166,19 +80,6 @@ TEST(MapSeeking, ASmoothMapIsWorthMoreThanThePlainOneWhereBendsCost) {
     EXPECT_LE(plant.knock(smooth.cell(c), smooth.best(c).input[0]), 1.02 * knock_limit) << c;
 }
 
-TEST(MapSeeking, ALimitWhoseKinkLiesBeforeThatOfTheModelIsKept) {
-  const Plant plant{.motored = 0.7}, rough{.octane = 5.0, .mbt_shift = 2.0, .motored = 0.7};
-  for (std::uint64_t seed = 0; seed < 6; ++seed) {
-    MapSeeking search(settings(seed, &rough));
-    const double visits = visited(search, plant, 12, seed).worst_knock;
-    double map = 0.0;
-    for (std::size_t c = 0; c < search.cells(); ++c)
-      map = std::max(map, plant.knock(search.cell(c), search.best(c).input[0]));
-    EXPECT_LT(visits, 1.05 * knock_limit) << seed;
-    EXPECT_LT(map, 1.01 * knock_limit) << seed;
-  }
-}
-
 TEST(MapSeeking, AModelOfTheWrongWayIsLeftBehind) {
   const Plant plant, wrong{.octane = 0.0, .mbt_shift = 0.0, .scale = -1.0};
   MapSeeking search(settings(1, &wrong));
@@ -197,76 +98,6 @@ TEST(MapSeeking, AskFindsTheBestOfAPointBetweenTheCells) {
     read(search, plant, at, asked, 70'000 + k);
   }
   EXPECT_LT(lost, 0.6);
-}
-
-TEST(MapSeeking, AnOddVisitIsMadeAgainAndDoesNotSpoilTheMap) {
-  const Plant plant, rough{.octane = -4.0, .mbt_shift = 5.0, .scale = 0.8};
-  for (const double lie : {-25.0, 25.0}) {
-    for (const int when : {7, 11}) {
-      MapSeeking search(settings(6, &rough));
-      visited(search, plant, when, 6);
-      const MapSeeking::Visit visit = search.suggest();
-      const double torque = plant.torque(visit.context, visit.input[0]) + lie;
-      const std::array<double, 1> knock{plant.knock(visit.context, visit.input[0])};
-      search.tell(visit.context, visit.input, {.components = {&torque, 1}, .limits = knock});
-      const MapSeeking::Visit again = search.suggest();
-      EXPECT_EQ(again.context, visit.context) << lie << ' ' << when;
-      EXPECT_EQ(again.input, visit.input) << lie << ' ' << when;
-      const Judged found = visited(search, plant, 6, 60);
-      EXPECT_LT(found.worst_loss, 1.0) << lie << ' ' << when;
-      EXPECT_LT(found.worst_knock, 1.05 * knock_limit) << lie << ' ' << when;
-    }
-  }
-}
-
-TEST(MapSeeking, ATrueSurpriseIsBelievedOnceItIsReadTwice) {
-  const Plant plant, worn{.octane = 0.0, .mbt_shift = 0.0, .scale = 0.85};
-  MapSeeking search(settings(7, &plant));
-  visited(search, plant, 8, 7);
-  int repeats = 0;
-  MapSeeking::Visit before = search.suggest();
-  for (std::uint64_t k = 0; k < 12; ++k) {
-    read(search, worn, before.context, before.input, 700 + k);
-    const MapSeeking::Visit next = search.suggest();
-    repeats += next.context == before.context && next.input == before.input ? 1 : 0;
-    before = next;
-  }
-  EXPECT_GE(repeats, 1);
-  EXPECT_LE(repeats, 6);
-  double off = 0.0;
-  for (std::size_t c = 0; c < search.cells(); ++c) {
-    const MapSeeking::Best best = search.best(c);
-    off += std::abs(best.expected - worn.torque(search.cell(c), best.input[0])) / 12.0;
-  }
-  EXPECT_LT(off, 5.0);  // N m of the 16 that it has lost
-}
-
-TEST(MapSeeking, WhereNoInputIsSafeTheMapGivesTheBestOfThoseThatAreAboutAsLikelyToBe) {
-  const Plant plant, rough{.octane = -1.0, .mbt_shift = 1.0, .scale = 0.9};
-  MapSeekingSettings own = settings(5, &rough);
-  own.limits = {{"knock", 0.01}};  // some cells keep it nowhere, and late sparks knock least
-  MapSeeking strict(own);
-  own.limit_probability = 0.7;
-  MapSeeking bold(own);
-  for (std::uint64_t k = 0; k < 10; ++k) {
-    const MapSeeking::Visit visit = strict.suggest();
-    read(strict, plant, visit.context, visit.input, 5000 + k);
-    read(bold, plant, visit.context, visit.input, 5000 + k);
-  }
-  int unsafe = 0;
-  double later = 0.0;
-  for (std::size_t c = 0; c < strict.cells(); ++c) {
-    const MapSeeking::Best least = strict.best(c), more = bold.best(c);
-    if (least.excess <= 0.0 || more.excess <= 0.0) continue;
-    ++unsafe;
-    EXPECT_LT(strict.holds(c, 0), 0.95) << c;
-    EXPECT_GE(bold.holds(c, 0), 0.7 * strict.holds(c, 0)) << c;
-    EXPECT_GE(more.expected, least.expected) << c;
-    later += more.input[0] - least.input[0];
-  }
-  EXPECT_GT(unsafe, 1);
-  EXPECT_LT(unsafe, static_cast<int>(strict.cells()));
-  EXPECT_GT(later, 1.0);
 }
 
 TEST(MapSeeking, LookingAtTheMapOfADriveChangesNothing) {

@@ -157,6 +157,8 @@ def test_the_command_line_takes_a_fit_where_it_takes_a_preset(
         assert payloads[-1]["preset"] == "own"
     assert payloads[1]["delay_samples"] == 2
     assert payloads[2]["start_angle_deg"] == 9.0
+    assert main(["throttle", "track", "--preset", str(file), "--airflow", "0.1"]) == 2
+    assert "--airflow = 0.1" in capsys.readouterr().err
     assert main(["throttle", "tune", "--preset", str(file), "--set", "coulomb_nm=1"]) == 2
     assert "--set" in capsys.readouterr().err
 
@@ -176,3 +178,14 @@ def test_the_command_line_tracks_with_what_it_tuned(capsys: pytest.CaptureFixtur
     numbers.write_text("{}")
     assert main(["throttle", "track", *own, "--numbers", str(numbers)]) == 2
     assert "tune --json" in capsys.readouterr().err
+
+
+def test_an_excitation_is_designed_on_a_fit_and_a_file_of_one_is_no_preset(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(FIT.to_toml())
+    assert main(["throttle", "excite", "chirp", "--preset", str(file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["preset"] == "own"
+    with pytest.raises(DataError, match="load_throttle_model"):
+        simulate_throttle(file, 0.3)

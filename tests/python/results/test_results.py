@@ -226,7 +226,8 @@ def test_what_is_no_unit_is_refused(units):
     "ending", [*_WHOLE, *(f"{over}_{name}" for name in _UNITS for over in ("", "_per", "_kg_per"))]
 )
 def test_the_unit_at_the_end_of_a_name_is_read_by_pint(ending):
-    pint.application_registry.parse_units(attribute_units(unit_of(f"x{ending}")))
+    registry = pint.application_registry
+    assert isinstance(registry.parse_units(attribute_units(unit_of(f"x{ending}"))), registry.Unit)
 
 
 def test_what_a_property_lacks_is_named_and_not_the_property() -> None:
