@@ -68,30 +68,32 @@ TEST(MapSeeking, ATrueSurpriseIsBelievedOnceItIsReadTwice) {
 
 TEST(MapSeeking, WhereNoInputIsSafeTheMapGivesTheBestOfThoseThatAreAboutAsLikelyToBe) {
   const Plant plant, rough{.octane = -1.0, .mbt_shift = 1.0, .scale = 0.9};
-  MapSeekingSettings own = settings(5, &rough);
-  own.limits = {{"knock", 0.01}};  // some cells keep it nowhere, and late sparks knock least
-  MapSeeking strict(own);
-  own.limit_probability = 0.7;
-  MapSeeking bold(own);
-  for (std::uint64_t k = 0; k < 10; ++k) {
-    const MapSeeking::Visit visit = strict.suggest();
-    read(strict, plant, visit.context, visit.input, 5000 + k);
-    read(bold, plant, visit.context, visit.input, 5000 + k);
-  }
-  int unsafe = 0;
+  int unsafe = 0, cells = 0;
   double later = 0.0;
-  for (std::size_t c = 0; c < strict.cells(); ++c) {
-    const MapSeeking::Best least = strict.best(c), more = bold.best(c);
-    if (least.excess <= 0.0 || more.excess <= 0.0) continue;
-    ++unsafe;
-    EXPECT_LT(strict.holds(c, 0), 0.95) << c;
-    EXPECT_GE(bold.holds(c, 0), 0.7 * strict.holds(c, 0)) << c;
-    EXPECT_GE(more.expected, least.expected) << c;
-    later += more.input[0] - least.input[0];
+  for (std::uint64_t seed = 5; seed < 11; ++seed) {
+    MapSeekingSettings own = settings(seed, &rough);
+    own.limits = {{"knock", 0.01}};  // some cells keep it nowhere, and late sparks knock least
+    MapSeeking strict(own);
+    own.limit_probability = 0.7;
+    MapSeeking bold(own);
+    for (std::uint64_t k = 0; k < 10; ++k) {
+      const MapSeeking::Visit visit = strict.suggest();
+      read(strict, plant, visit.context, visit.input, 1000 * seed + k);
+      read(bold, plant, visit.context, visit.input, 1000 * seed + k);
+    }
+    for (std::size_t c = 0; c < strict.cells(); ++c) {
+      const MapSeeking::Best least = strict.best(c), more = bold.best(c);
+      ++cells;
+      if (least.excess <= 0.0 || more.excess <= 0.0) continue;
+      ++unsafe;
+      EXPECT_LT(strict.holds(c, 0), 0.95) << c;
+      EXPECT_GE(bold.holds(c, 0), 0.7 * strict.holds(c, 0)) << c;
+      later += more.input[0] - least.input[0];
+    }
   }
-  EXPECT_GT(unsafe, 1);
-  EXPECT_LT(unsafe, static_cast<int>(strict.cells()));
-  EXPECT_GT(later, 1.0);
+  EXPECT_GT(unsafe, 3);
+  EXPECT_LT(unsafe, cells / 2);
+  EXPECT_GT(later, 0.5 * unsafe);
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ TEST(ProcessModel, FullItForgetsOldReadingsNearTheEstimateAndKeepsFarOnes) {
   EXPECT_NEAR(model.mean(1), -6.0, 0.5);
 }
 
-TEST(ProcessModel, ARowOfCovariancesIsThatOfEachPair) {
+TEST(ProcessModel, RowsOfCovariancesAreThoseOfEachPair) {
   ProcessModel model = told(25, 0.2, {.most_points = 700});
   InputTable points(700, 2);
   for (int p = 0; p < 700; ++p) {
@@ -108,10 +108,14 @@ TEST(ProcessModel, ARowOfCovariancesIsThatOfEachPair) {
         random::uniform(5, 2, static_cast<std::uint64_t>(p));
   }
   model.predict(points, 700);
-  std::vector<double> row(700);
-  model.covariances(3, 700, row.data());
-  for (const int p : {0, 3, 499, 500, 699})
-    EXPECT_NEAR(row[static_cast<std::size_t>(p)], model.covariance(3, p), 1e-9 * model.covariance(3, 3)) << p;
+  const std::array<int, 10> of{3, 699, 4, 5, 500, 6, 7, 8, 9, 0};
+  InputTable rows(10, 700);
+  model.covariances(of, 700, rows);
+  for (Eigen::Index k = 0; k < 10; ++k) {
+    const int own = of[static_cast<std::size_t>(k)];
+    for (const int p : {0, 3, 499, 500, 699})
+      EXPECT_NEAR(rows(k, p), model.covariance(own, p), 1e-9 * model.covariance(own, own)) << own << ' ' << p;
+  }
 }
 
 // Four readings at one place are as good as their mean, said to be of four.

@@ -45,6 +45,7 @@ ProcessModel::ProcessModel(const Settings& settings)
       order_(static_cast<std::size_t>(settings.kept), 0),
       chosen_(evidence_readings, 0),
       kernels_(settings.most_points, settings.kept),
+      together_(together, settings.kept),
       asked_(InputTable::Zero(settings.most_points, kernel_.width())),
       asked_columns_(InputTable::Zero(kernel_.width(), settings.most_points)) {
   now_.inverse_length = Inputs::Ones(settings.inputs);
@@ -146,17 +147,17 @@ void ProcessModel::fit(const Inputs& about) noexcept {
   weigh();
 }
 
-void ProcessModel::predict(const InputTable& at, int points) noexcept {
-  predict_means(at, points);
+void ProcessModel::predict(const InputTable& at, int points, int from) noexcept {
+  predict_means(at, points, from);
   factor_.topLeftCorner(count_, count_)
       .triangularView<Eigen::Lower>()
-      .solveInPlace(kernels_.topLeftCorner(points, count_).transpose());
-  asked_columns_.leftCols(points) = asked_.topRows(points).transpose();
+      .solveInPlace(kernels_.block(from, 0, points, count_).transpose());
+  asked_columns_.middleCols(from, points) = asked_.middleRows(from, points).transpose();
 }
 
-void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
+void ProcessModel::predict_means(const InputTable& at, int points, int from) noexcept {
   refresh();
-  for (int p = 0; p < points; ++p) {
+  for (int p = from; p < from + points; ++p) {
     kernel_.describe(at.row(p).head(settings_.inputs).transpose(), &asked_(p, 0));
     double* const own = &kernels_(p, 0);
     kernel_.covariances(&asked_(p, 0), columns_, count_, now_, own);
@@ -164,13 +165,26 @@ void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
   }
 }
 
-void ProcessModel::covariances(int i, int points, double* out) const noexcept {
-  for (int from = 0; from < points; from += most_kept) {
-    const int some = std::min(most_kept, points - from);
-    kernel_.covariances(&asked_(i, 0), asked_columns_.middleCols(from, some), some, now_, out + from);
+// Eight at a time, so that what is known of a point is fetched once for all of them.
+void ProcessModel::covariances(std::span<const int> of, int points, InputTable& out) noexcept {
+  for (std::size_t first = 0; first < of.size(); first += together) {
+    const auto some = static_cast<Eigen::Index>(std::min<std::size_t>(together, of.size() - first));
+    for (Eigen::Index k = 0; k < some; ++k) {
+      const int own = of[first + static_cast<std::size_t>(k)];
+      together_.row(k).head(count_) = kernels_.row(own).head(count_);
+      double* const row = &out(static_cast<Eigen::Index>(first) + k, 0);
+      for (int from = 0; from < points; from += most_kept) {
+        const int part = std::min(most_kept, points - from);
+        kernel_.covariances(&asked_(own, 0), asked_columns_.middleCols(from, part), part, now_, row + from);
+      }
+    }
+    for (int p = 0; p < points; ++p) {
+      Eigen::Matrix<double, Eigen::Dynamic, 1, 0, together, 1> both(some);
+      both.noalias() = together_.topLeftCorner(some, count_) * kernels_.row(p).head(count_).transpose();
+      for (Eigen::Index k = 0; k < some; ++k)
+        out(static_cast<Eigen::Index>(first) + k, p) -= both[k];
+    }
   }
-  Eigen::Map<Eigen::VectorXd>(out, points).noalias() -=
-      kernels_.topLeftCorner(points, count_) * kernels_.row(i).head(count_).transpose();
 }
 
 double ProcessModel::covariance(int i, int j) const noexcept {

@@ -4,7 +4,7 @@
 
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "mgdd/optimize/laws/process_laws.hpp"
-#include "mgdd/optimize/limits/multipliers.hpp"
+#include "mgdd/optimize/limits/limited_step.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -16,6 +16,7 @@ constexpr double rises_in_room = 2.0, least_step = 0.25;  // sd that a first ste
 
 constexpr int pull_rounds = 2, pull_sweeps = 4;  // the process bends, and limits meet
 constexpr double farthest_pull = 0.3;            // in ranges, as far as slopes at the estimate may say
+constexpr double at_bound = 1e-3;                // ranges
 constexpr double inside_edge = 1e-3;             // scales of a limit, so that rounding leaves it kept
 
 }  // namespace
@@ -42,7 +43,8 @@ void GaussianProcessSeeking::judge_safety(int points, double quantile) noexcept 
   std::fill(mean_over_.begin(), mean_over_.end(), -largest_reading);
   std::fill(credit_.begin(), credit_.end(), 0.0);
   if (failing_.by_input()) {
-    failing_.judge(candidates_, points, since_failure_ < wary_ ? wary_of_failing : not_failing,
+    failing_.predict(candidates_, points);
+    failing_.judge(points, 0, since_failure_ < wary_ ? wary_of_failing : not_failing,
                    [this](double likely, double mean, int p) { judge(likely, mean, p); });
   }
   for (std::size_t i = 0; i < limited_.size(); ++i) {
@@ -116,7 +118,14 @@ void GaussianProcessSeeking::know_edge(const Inputs& at) noexcept {
   judge_safety(points, quantile_);
   for (std::size_t i = 0; i < limited_.size(); ++i)
     slopes(limited_[i].model(), edges_.row(static_cast<Eigen::Index>(i)), settings_.limits[i].scale);
-  multipliers(rest, at, edges_, [&](std::size_t i) { return excess_[i * candidates] > -active_room; }, multipliers_);
+  Inputs low = Inputs::Constant(n, -unlimited), high = -low;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (at[k] < at_bound) low[k] = 0.0;
+    if (at[k] > 1.0 - at_bound) high[k] = 0.0;
+  }
+  for (std::size_t i = 0; i < limited_.size(); ++i)
+    holding_[i] = excess_[i * candidates] > -active_room ? 0.0 : -unlimited;
+  limited_step(rest, Inputs::Ones(n), edges_, holding_, low, high, multipliers_);
 }
 
 }  // namespace mgdd::optimize

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/belief/row_cholesky.hpp"
@@ -77,7 +78,7 @@ void MapSeeking::first_visit() noexcept {
 
 // The best input of a cell, the most promising one, the least known one, those at the ends, and some from everywhere.
 int MapSeeking::visits_of(std::size_t c, std::span<int> out) const noexcept {
-  const int from = static_cast<int>(c) * per_place;
+  const int best = point_of(c, 0);
   std::size_t count = 0;
   const auto take = [&](int p) {
     const auto taken = out.first(count);
@@ -85,7 +86,8 @@ int MapSeeking::visits_of(std::size_t c, std::span<int> out) const noexcept {
   };
   int promise = -1, widest = -1, first = -1, last = -1;
   double most = 0.0, wide = 0.0;
-  for (int p = from; p < from + per_place; ++p) {
+  for (int k = 0; k < per_place; ++k) {
+    const int p = point_of(c, k);
     if (!safe(p, places_[c])) continue;
     const double sd = j_.sd(p), hope = worth(p) + promising * sd;
     if (promise < 0 || hope > most) {
@@ -100,21 +102,20 @@ int MapSeeking::visits_of(std::size_t c, std::span<int> out) const noexcept {
     if (last < 0 || candidates_(p, context_) > candidates_(last, context_)) last = p;
   }
   if (promise < 0) return 0;
-  if (safe(from, places_[c])) take(from);
+  if (safe(best, places_[c])) take(best);
   for (const int p : {promise, widest, first, last})
     take(p);
   for (int k = 0; k < per_place; ++k) {
-    const int p = from + static_cast<int>(uniform(440, from + k) * per_place);
+    const int p = point_of(c, static_cast<int>(uniform(440, static_cast<int>(c) * per_place + k) * per_place));
     if (safe(p, places_[c])) take(p);
   }
   return static_cast<int>(count);
 }
 
 // By what a reading at a candidate is expected to raise the J of all cells.
-double MapSeeking::gain_of(int point) noexcept {
+double MapSeeking::gain_of(int point, const double* covariances) noexcept {
   const double sd = std::hypot(j_.sd(point), j_.noise_sd() / std::sqrt(settings_.averaged));
   if (!(sd > 0.0)) return 0.0;
-  j_.covariances(point, static_cast<int>(cells()) * per_place, effect_.data());
   double out = 0.0;
   for (std::size_t c = 0; c < cells(); ++c) {
     const auto from = static_cast<std::size_t>(safe_from_[c]), n = static_cast<std::size_t>(safe_from_[c + 1]) - from;
@@ -122,7 +123,7 @@ double MapSeeking::gain_of(int point) noexcept {
     for (std::size_t k = 0; k < n; ++k) {
       const int p = safe_[from + k];
       means[k] = worth(p);
-      effects[k] = effect_[static_cast<std::size_t>(p)] / sd;
+      effects[k] = covariances[p] / sd;
     }
     const auto [least, most] = std::ranges::minmax(effects);
     if (most - least < least_effect * sd) continue;
@@ -135,7 +136,7 @@ double MapSeeking::gain_of(int point) noexcept {
     for (std::size_t c = 0; c < cells(); ++c) {
       const double multiplier = multipliers_[c * limited_.size() + i];
       if (!(multiplier > 0.0)) continue;
-      const int best = static_cast<int>(c) * per_place;
+      const int best = point_of(c, 0);
       const double doubt = model.sd(best), both = model.covariance(best, point);
       if (!(doubt > 0.0)) continue;
       const double left = std::sqrt(std::max(1.0 - both * both / (reading * doubt * doubt), 0.0));
@@ -168,10 +169,12 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     std::array<int, most_visits> visits{};
     const int count = visits_of(c, visits);
     const double works = std::pow(by_chance, failures_[c]);  // that a cell which has failed so often does
+    j_.covariances(std::span(visits).first(static_cast<std::size_t>(count)), last_point(), effects_);
     const bool elsewhere = (cell(c) - last_context_).cwiseAbs().maxCoeff() > 0.0;
     for (int k = 0; k < count; ++k) {
       const int p = visits[static_cast<std::size_t>(k)];
-      const double gain = gain_of(p), worth = works * (elsewhere ? gain / (1.0 + settings_.moving_cost) : gain);
+      const double gain = gain_of(p, &effects_(k, 0)),
+                   worth = works * (elsewhere ? gain / (1.0 + settings_.moving_cost) : gain);
       if (worth <= most) continue;
       most = worth;
       next = p;
@@ -183,7 +186,7 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     visit_.gain = 0.0;
   }
   visit_.sd = j_.sd(next);
-  visit_.context = cell(static_cast<std::size_t>(next / per_place));
+  visit_.context = cell(place_of(next));
   visit_.input = unscaled(candidates_.row(next).tail(inputs_).transpose());
   return visit_;
 }
@@ -215,8 +218,9 @@ const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
   if (count == 0) {
     next = least_unsafe(places);
   } else {
-    for (int p = 0; p < per_place; ++p)
-      j_.covariances(p, per_place, &joint_(p, 0));
+    std::array<int, per_place> all{};
+    std::iota(all.begin(), all.end(), 0);
+    j_.covariances(all, per_place, joint_);
     const double noise = std::max(j_.noise_sd(), worth_noise * std::abs(j_.mean(0)));
     const double read = static_cast<double>(j_.count()) / (cautious_readings * static_cast<double>(1 + inputs_));
     next = most_worth(
@@ -230,11 +234,10 @@ const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
 // Regret and place by samples of J at the candidates of a cell that keep its limits.
 void MapSeeking::sample(std::size_t c, Best& out) noexcept {
   if (out.excess > 0.0) {  // nothing is known to be safe: all that J ranges over may be lost
-    const int first = static_cast<int>(c) * per_place;
-    double low = j_.mean(first), high = low;
-    for (int p = first; p < first + per_place; ++p) {
-      low = std::min(low, j_.mean(p));
-      high = std::max(high, j_.mean(p));
+    double low = j_.mean(point_of(c, 0)), high = low;
+    for (int k = 1; k < per_place; ++k) {
+      low = std::min(low, j_.mean(point_of(c, k)));
+      high = std::max(high, j_.mean(point_of(c, k)));
     }
     out.regret = high - low;
     out.input_sd = settings_.space.upper - settings_.space.lower;

@@ -7,16 +7,13 @@
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/laws/map_seeking.hpp"
 #include "mgdd/optimize/laws/process_laws.hpp"
-#include "mgdd/optimize/limits/multipliers.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
-constexpr int map_rounds = 6;
-constexpr double map_width = 0.1, map_shrinks = 0.5;  // ranges, per round
-constexpr double least_sd = 1e-12;                    // scales of a limit
-constexpr double likely_quantile = 1.0;               // of what is asked where nothing is safe
-constexpr double reach_beyond_read = 2.0;             // reaches
+constexpr double least_sd = 1e-12;         // scales of a limit
+constexpr double likely_quantile = 1.0;    // of what is asked where nothing is safe
+constexpr double reach_beyond_read = 2.0;  // reaches
 // Likely to fail by 3 to 1: cells that were never read are not given up for a failure beside them.
 constexpr FailingProcess::Demand sure_to_fail{0.0, 0.5, 0.0};
 constexpr std::uint64_t draws_per_reading = 1'000'003;
@@ -37,24 +34,31 @@ void MapSeeking::put(int row, const Inputs& context, const Inputs& z) noexcept {
   candidates_.row(row).tail(inputs_) = settable(z).transpose();
 }
 
-// The largest excess of any limit, in its scale, of every candidate: for the map, for what is asked, and where nothing
-// is safe; and the largest mean of one in standard deviations.
-void MapSeeking::judge(int points) noexcept {
+// The largest excess of any limit, in its scale, of candidates: for the map, for what is asked, and where nothing is
+// safe; and the largest mean of one in standard deviations.
+void MapSeeking::judge(int points, int from) noexcept {
   for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &odds_})
-    std::fill_n(one->begin(), points, -largest_reading);
-  for (LimitProcess& limited : limited_) {
-    limited.model().predict(candidates_, points);
-    for (int p = 0; p < points; ++p) {
+    std::fill_n(one->begin() + from, points, -largest_reading);
+  for (std::size_t i = 0; i < limited_.size(); ++i) {
+    LimitProcess& limited = limited_[i];
+    limited.model().predict(candidates_, points, from);
+    for (int p = from; p < from + points; ++p) {
       const auto at = static_cast<std::size_t>(p);
       const double mean = limited.excess(p, 0.0), sd = limited.sd(p);
+      excess_(static_cast<Eigen::Index>(i), p) = mean + quantile_ * sd;
       over_[at] = std::max(over_[at], mean + quantile_ * sd);
       cautious_[at] = std::max(cautious_[at], mean + cautious_quantile_ * sd);
       mean_over_[at] = std::max(mean_over_[at], mean + likely_quantile * sd / limited.widening());
       odds_[at] = std::max(odds_[at], mean / std::max(sd, least_sd));
     }
   }
+  if (failing_.by_input()) failing_.predict(candidates_, points, from);
+}
+
+// Which of candidates that have been judged are likely to fail.
+void MapSeeking::judge_failing(int points, int from) noexcept {
   if (!failing_.by_input()) return;
-  failing_.judge(candidates_, points, sure_to_fail, [this](double likely, double mean, int p) {
+  failing_.judge(points, from, sure_to_fail, [this](double likely, double mean, int p) {
     const auto at = static_cast<std::size_t>(p);
     over_[at] = std::max(over_[at], likely);
     cautious_[at] = std::max(cautious_[at], likely);
@@ -81,25 +85,10 @@ void MapSeeking::know_roughness(const Place& place, int from, int count, bool co
   }
 }
 
-// Of a place's points the one that is worth most and keeps the limits, or the least unsafe one.
-void MapSeeking::keep_best(Place& place, int from, int count, bool smooth) noexcept {
-  know_roughness(place, from, count, smooth);
-  int best = from;
-  for (int p = from + 1; p < from + count; ++p) {
-    const auto own = static_cast<std::size_t>(p), known = static_cast<std::size_t>(best);
-    const bool safe = over_[own] <= 0.0, was = over_[known] <= 0.0;
-    const bool better = safe != was ? safe : safe ? worth(p) > worth(best) : over_[own] < over_[known];
-    if (better) best = p;
-  }
-  place.best = candidates_.row(best).tail(inputs_).transpose();
-}
-
-// Of every place its best input, some from everywhere, and a cloud around the best at distances of all sizes; `sure`:
-// with the covariances of J.
-void MapSeeking::scatter(std::span<const Place> places, bool sure) noexcept {
-  int row = 0;
+// Some from everywhere, and where the search begins.
+void MapSeeking::spread_out(std::span<Place> places) noexcept {
+  int row = point_of(0, 1 + near);
   for (const Place& place : places) {
-    put(row++, place.context, place.best);
     for (int p = 0; p < spread; ++p, ++row) {
       Inputs z(inputs_);
       for (Eigen::Index i = 0; i < inputs_; ++i)
@@ -107,6 +96,104 @@ void MapSeeking::scatter(std::span<const Place> places, bool sure) noexcept {
       z[0] = (p + z[0]) / spread;
       put(row, place.context, z);
     }
+  }
+  for (const Place& place : places)
+    put(row++, place.context, place.from);
+  const int first = point_of(0, 1 + near), count = row - first;
+  judge(count, first);
+  judge_failing(count, first);
+  j_.predict(candidates_, count, first);
+  row = last_point();
+  for (std::size_t c = 0; c < places.size(); ++c, ++row) {
+    know_roughness(places[c], row, 1, false);
+    places[c].best = candidates_.row(row).tail(inputs_).transpose();
+    places[c].climb.begin(places[c].best, worth_of(row));
+    consider(places[c], point_of(c, 1 + near), spread, false);
+  }
+}
+
+Climb::Worth MapSeeking::worth_of(int point) const noexcept {
+  return {over_[static_cast<std::size_t>(point)], worth(point)};
+}
+
+// With the other places as they are by now: what this one gains, a smooth map gains.
+void MapSeeking::consider(Place& place, int from, int count, bool smooth) noexcept {
+  know_roughness(place, from, count, smooth);
+  if (smooth && settings_.smoothness > 0.0) {
+    const double rough = roughness(place, place.best);
+    place.climb.renew({place.climb.known().over, place.climb.known().worth + place.rough - rough});
+    place.rough = rough;
+  }
+  for (int p = from; p < from + count; ++p) {
+    if (!place.climb.consider(candidates_.row(p).tail(inputs_).transpose(), worth_of(p))) continue;
+    place.best = place.climb.best();
+    place.rough = rough_[static_cast<std::size_t>(p)];
+  }
+}
+
+// From the best of every place uphill, along its limits.
+void MapSeeking::climb(std::span<Place> places, bool smooth) noexcept {
+  const int first = last_point();
+  const auto limits = static_cast<Eigen::Index>(limited_.size());
+  const auto take = [&](int per) {
+    const int count = per * searching_;
+    judge(count, first);
+    judge_failing(count, first);
+    j_.predict_means(candidates_, count, first);
+  };
+  const auto over_at = [&](int p) {
+    for (Eigen::Index i = 0; i < limits; ++i)
+      edge_over_[static_cast<std::size_t>(i)] = excess_(i, p) + Climb::inside;
+    return std::span(edge_over_);
+  };
+  if (smooth) {
+    for (Place& place : places)
+      place.climb.begin(place.best, place.climb.known());
+  }
+  const auto edges_of = [&](std::size_t c) { return edges_.middleRows(static_cast<Eigen::Index>(c) * limits, limits); };
+  for (int round = 0; round < Climb::rounds; ++round) {
+    const int star = places[0].climb.star();
+    for (int p = 0; p < star * searching_; ++p) {
+      const Place& place = places[static_cast<std::size_t>(p / star)];
+      put(first + p, place.context, place.climb.beside(p % star, aside_));
+    }
+    take(star);
+    for (std::size_t c = 0; c < places.size(); ++c) {
+      Climb& own = places[c].climb;
+      const int at = first + static_cast<int>(c) * star;
+      auto edges = edges_of(c);
+      know_roughness(places[c], at, star, smooth);
+      for (Eigen::Index i = 0; i < limits; ++i)
+        own.slopes(aside_, [&](int k) { return excess_(i, at + k); }, edges.row(i));
+      own.renew(worth_of(at));
+      places[c].rough = rough_[static_cast<std::size_t>(at)];
+      own.aim(
+          aside_, [&](int k) { return worth(at + k); }, edges, over_at(at),
+          std::span(multipliers_).subspan(c * limited_.size(), limited_.size()));
+      if (steps_.any()) consider(places[c], at, star, smooth);
+    }
+    for (const bool back : {false, true}) {
+      int row = first;
+      for (std::size_t c = 0; c < places.size(); ++c) {
+        const Climb& own = places[c].climb;
+        for (int k = 0; k < Climb::tries; ++k, ++row)
+          put(row, places[c].context, back ? own.moved_back(k, edges_of(c), over_at(row), unused_) : own.tried(k));
+      }
+      take(Climb::tries);
+      for (std::size_t c = 0; c < places.size(); ++c)
+        consider(places[c], first + static_cast<int>(c) * Climb::tries, Climb::tries, smooth);
+      if (limits == 0) break;
+    }
+    for (Place& place : places)
+      place.climb.narrow();
+  }
+}
+
+// Of every place its best input and a cloud around it at distances of all sizes.
+void MapSeeking::cloud_around(std::span<const Place> places) noexcept {
+  int row = 0;
+  for (const Place& place : places) {
+    put(row++, place.context, place.best);
     for (int p = 0; p < near; ++p, ++row) {
       const double distance = cloud_nearest * std::pow(cloud_farthest / cloud_nearest, (p + 0.5) / near);
       Inputs z = place.best;
@@ -115,109 +202,37 @@ void MapSeeking::scatter(std::span<const Place> places, bool sure) noexcept {
       put(row, place.context, z);
     }
   }
-  judge(row);
-  if (sure) {
-    j_.predict(candidates_, row);
-  } else {
-    j_.predict_means(candidates_, row);
-  }
-}
-
-// Around the best of every place, ever nearer.
-void MapSeeking::narrow(std::span<Place> places, bool smooth) noexcept {
-  double width = map_width;
-  for (int round = 0; round < map_rounds; ++round, width *= map_shrinks) {
-    int row = 0;
-    for (const Place& place : places) {
-      put(row++, place.context, place.best);
-      for (int p = 1; p < cloud; ++p, ++row) {
-        Inputs z = place.best;
-        const auto stream = 420 + static_cast<std::uint64_t>(max_inputs) * static_cast<std::uint64_t>(round);
-        for (Eigen::Index i = 0; i < inputs_; ++i)
-          z[i] += width * normal(stream + static_cast<std::uint64_t>(i), row);
-        put(row, place.context, z);
-      }
-    }
-    judge(row);
-    j_.predict_means(candidates_, row);
-    int from = 0;
-    for (Place& place : places) {
-      keep_best(place, from, cloud, smooth);
-      from += cloud;
-    }
-  }
+  judge(row, 0);
+  j_.predict(candidates_, row, 0);
+  judge_failing(last_point(), 0);
 }
 
 // Of every place for itself, then, where it counts, as one smooth map: place by place that is worth ever more.
 void MapSeeking::search(std::span<Place> places) noexcept {
-  for (Place& place : places)
-    place.best = place.from;
-  scatter(places, false);
-  int from = 0;
-  for (Place& place : places) {
-    keep_best(place, from, per_place, false);
-    from += per_place;
-  }
-  narrow(places, false);
-  if (settings_.smoothness > 0.0) narrow(places, true);
-  know_edges(places);
-  scatter(places, true);
-  from = 0;
-  for (const Place& place : places) {
-    know_roughness(place, from, per_place, true);
-    from += per_place;
+  searching_ = static_cast<int>(places.size());
+  spread_out(places);
+  climb(places, false);
+  if (settings_.smoothness > 0.0) climb(places, true);
+  cloud_around(places);
+  for (std::size_t c = 0; c < places.size(); ++c) {
+    know_roughness(places[c], point_of(c, 0), 1 + near, true);
+    know_roughness(places[c], point_of(c, 1 + near), spread, true);
   }
   choose_safe(places);
 }
 
-// What J of a place would gain by each limit that holds its best input back, were it wider by its scale.
-void MapSeeking::know_edges(std::span<const Place> places) noexcept {
-  if (limited_.empty()) return;
-  const int n = static_cast<int>(inputs_), own = 1 + 2 * n;
-  static_assert(1 + 2 * max_inputs <= per_place);
-  int row = 0;
-  for (const Place& place : places) {
-    put(row++, place.context, place.best);
-    for (int k = 0; k < n; ++k) {
-      for (const double side : {slope_step, -slope_step}) {
-        candidates_.row(row) = candidates_.row(row - 1 - (side > 0.0 ? 2 * k : 2 * k + 1));
-        candidates_(row, context_ + k) = std::clamp(place.best[k] + side, 0.0, 1.0);
-        ++row;
-      }
-    }
-  }
-  judge(row);
-  j_.predict_means(candidates_, row);
-  row = 0;
-  for (std::size_t c = 0; c < places.size(); ++c, row += own) {
-    Inputs rise(inputs_);
-    const auto slope = [&](const ProcessModel& model, int k) {
-      const int up = row + 1 + 2 * k;
-      return (model.mean(up) - model.mean(up + 1)) /
-             (candidates_(up, context_ + k) - candidates_(up + 1, context_ + k));
-    };
-    for (int k = 0; k < n; ++k) {
-      rise[k] = slope(j_, k);
-      for (std::size_t i = 0; i < limited_.size(); ++i)
-        edges_(static_cast<Eigen::Index>(i), k) = slope(limited_[i].model(), k) / settings_.limits[i].scale;
-    }
-    multipliers(
-        rise, places[c].best, edges_, [&](std::size_t i) { return limited_[i].excess(row, quantile_) > -active_room; },
-        std::span(multipliers_).subspan(c * limited_.size(), limited_.size()));
-  }
-}
-
 // Of a place without an input that is known to be safe, the one that is worth most of those that are as likely to keep
 // the limits as any, to `limit_probability`: towards the likeliest one that says little more.
-void MapSeeking::know_likeliest(Place& place, int from) noexcept {
+void MapSeeking::know_likeliest(std::size_t c, Place& place) noexcept {
   const auto likely = [this](int p) {
     return 0.5 * std::erfc(odds_[static_cast<std::size_t>(p)] / std::numbers::sqrt2);
   };
   double likeliest = 0.0, most = -std::numeric_limits<double>::infinity();
-  for (int p = from; p < from + per_place; ++p)
-    likeliest = std::max(likeliest, likely(p));
+  for (int k = 0; k < per_place; ++k)
+    likeliest = std::max(likeliest, likely(point_of(c, k)));
   if (!(likeliest > 0.0)) return;
-  for (int p = from; p < from + per_place; ++p) {
+  for (int k = 0; k < per_place; ++k) {
+    const int p = point_of(c, k);
     if (likely(p) < settings_.limit_probability * likeliest || worth(p) <= most) continue;
     most = worth(p);
     place.known = p;
@@ -230,16 +245,17 @@ void MapSeeking::choose_safe(std::span<Place> places) noexcept {
   int count = 0;
   for (std::size_t c = 0; c < places.size(); ++c) {
     safe_from_[c] = count;
-    const int from = static_cast<int>(c) * per_place;
-    double low = j_.mean(from), high = low;
-    for (int p = from; p < from + per_place; ++p) {
+    const int first = point_of(c, 0);
+    double low = j_.mean(first), high = low;
+    for (int k = 0; k < per_place; ++k) {
+      const int p = point_of(c, k);
       low = std::min(low, j_.mean(p));
       high = std::max(high, j_.mean(p));
-      if (p == from || over_[static_cast<std::size_t>(p)] <= 0.0) safe_[static_cast<std::size_t>(count++)] = p;
+      if (k == 0 || over_[static_cast<std::size_t>(p)] <= 0.0) safe_[static_cast<std::size_t>(count++)] = p;
     }
-    places[c].known = from;
-    if (over_[static_cast<std::size_t>(from)] <= 0.0) continue;
-    know_likeliest(places[c], from);
+    places[c].known = first;
+    if (over_[static_cast<std::size_t>(first)] <= 0.0) continue;
+    know_likeliest(c, places[c]);
     for (std::size_t i = 0; i < limited_.size(); ++i)
       multipliers_[c * limited_.size() + i] = high - low;
   }
@@ -263,11 +279,11 @@ bool MapSeeking::safe(int point, const Place& place) const noexcept {
 int MapSeeking::least_unsafe(std::span<const Place> places) const noexcept {
   int best = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (int p = 0; p < static_cast<int>(places.size()) * per_place; ++p) {
+  for (int p = 0; p < last_point(); ++p) {
     const Inputs z = candidates_.row(p).tail(inputs_).transpose();
     const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
     const double own = mean_over_[static_cast<std::size_t>(p)];
-    if (places.size() == cells() && failures_[static_cast<std::size_t>(p / per_place)] >= given_up) continue;
+    if (places.size() == cells() && failures_[place_of(p)] >= given_up) continue;
     if (beyond > reach_beyond_read * settings_.reach || own >= least) continue;
     least = own;
     best = p;

@@ -73,8 +73,10 @@ std::size_t count_of(const std::vector<std::vector<double>>& axes) {
   return out;
 }
 
+// Of all places, with those that a climb tries.
 int points_of(const MapSeekingSettings& s, int per_place) {
-  return per_place * static_cast<int>(std::max<std::size_t>(1, count_of(s.axes)));
+  const int tried = std::max(1 + 2 * static_cast<int>(s.space.size()), Climb::tries);
+  return (per_place + tried) * static_cast<int>(std::max<std::size_t>(1, count_of(s.axes)));
 }
 
 void require_axes(const MapSeekingSettings& s) {
@@ -155,18 +157,24 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
       visit_{Inputs::Zero(context_), settings_.space.start},
       asked_(settings_.space.start),
       candidates_(InputTable::Zero(points_of(settings_, per_place), context_ + inputs_)),
-      edges_(InputTable::Zero(static_cast<Eigen::Index>(settings_.limits.size()), inputs_)),
+      multipliers_(places_.size() * limited_.size(), 0.0),
+      edge_over_(limited_.size(), 0.0),
+      unused_(edge_over_),
+      edges_(InputTable::Zero(static_cast<Eigen::Index>(multipliers_.size()), inputs_)),
+      excess_(InputTable::Zero(static_cast<Eigen::Index>(limited_.size()), candidates_.rows())),
       joint_(per_place, per_place),
+      effects_(most_visits, candidates_.rows()),
       worth_(per_place) {
   for (std::size_t c = 0; c < places_.size(); ++c)
     places_[c] = {c < cells() ? scaled_context(cell(c)) : Inputs(Inputs::Zero(context_)), lowest_, lowest_};
   const auto points = static_cast<std::size_t>(candidates_.rows());
-  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &odds_, &rough_, &effect_})
+  for (std::vector<double>* one : {&over_, &cautious_, &mean_over_, &odds_, &rough_})
     one->assign(points, 0.0);
   safe_.assign(points, 0);
   safe_from_.assign(places_.size() + 1, 0);
-  multipliers_.assign(places_.size() * limited_.size(), 0.0);
   bends_ = bends_of_cells();
+  aside_ = Inputs::Constant(inputs_, slope_step);
+  if (steps_.any()) aside_ = aside_.cwiseMax(steps_.size.cwiseQuotient(settings_.space.upper - settings_.space.lower));
 }
 
 std::vector<std::vector<MapSeeking::Bend>> MapSeeking::bends_of_cells() const {

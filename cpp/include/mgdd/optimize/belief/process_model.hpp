@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -56,10 +57,10 @@ class ProcessModel {
   /// Looks for better numbers of the process and makes predictions possible; 2 readings at least, 1 with a guide.
   void fit(const Inputs& about) noexcept;
 
-  /// Mean of the quantity at the first `points` rows of `at`.
-  void predict_means(const InputTable& at, int points) noexcept;
+  /// Mean of the quantity at `points` rows of `at`; what is known of other rows stays until the next reading or fit.
+  void predict_means(const InputTable& at, int points, int from = 0) noexcept;
   /// The same, and what `covariance` needs.
-  void predict(const InputTable& at, int points) noexcept;
+  void predict(const InputTable& at, int points, int from = 0) noexcept;
   double mean(int point) const noexcept { return mean_[point]; }
   /// Of the quantity, without the noise of a reading, at two of these points.
   double covariance(int i, int j) const noexcept;
@@ -68,8 +69,8 @@ class ProcessModel {
   double widening(Eigen::Index freedom) const noexcept {
     return 1.0 + few_readings / std::max(1.0, static_cast<double>(count_ - freedom));
   }
-  /// The same of one of them and of all `points` of the last prediction.
-  void covariances(int i, int points, double* out) const noexcept;
+  /// The same of each of some of them with the first `points`, a row each.
+  void covariances(std::span<const int> of, int points, InputTable& out) noexcept;
 
   /// What the bend, where readings leave it open, makes of the prediction at `z`: to be added to mean and variance.
   struct Correction {
@@ -136,6 +137,7 @@ class ProcessModel {
 
  private:
   static constexpr int evidence_readings = 60, more_readings = 40;
+  static constexpr int together = 8;
   static constexpr double most_trusted = 81.0;  // of what a variance is multiplied by: nine standard deviations
   static constexpr double few_readings = 2.0;   // over degrees of freedom
   // Logarithms: bend, noise over bend, size of the rest over bend, lengths; how fast slopes and level wander, over the
@@ -195,7 +197,8 @@ class ProcessModel {
   InputTable factor_, small_;              // lower triangles
   Eigen::VectorXd weights_, small_rest_, mean_of_, distance_, mean_;
   std::vector<int> order_, chosen_;
-  InputTable kernels_;  // a row per point: of the readings, solved with the factor
+  InputTable kernels_;   // a row per point: of the readings, solved with the factor
+  InputTable together_;  // the same of a few
   InputTable asked_, asked_columns_;
   Scales now_;
 };

@@ -214,7 +214,8 @@ class GaussianProcessSeeking {
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
   std::vector<double> effect_, over_, mean_over_;
-  std::vector<double> excess_, multipliers_, credit_;  // of every limit at the candidates; J per scale of a limit
+  std::vector<double> excess_, multipliers_, holding_,
+      credit_;  // of every limit at the candidates; J per scale of a limit
   std::vector<int> order_;
   WorthScratch worth_;
 };

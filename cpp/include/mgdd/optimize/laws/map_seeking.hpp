@@ -21,6 +21,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/ask_tell/seeker.hpp"
 #include "mgdd/optimize/belief/process_model.hpp"
+#include "mgdd/optimize/laws/climb.hpp"
 #include "mgdd/optimize/laws/most_worth.hpp"
 #include "mgdd/optimize/limits/failing_process.hpp"
 #include "mgdd/optimize/limits/limit_process.hpp"
@@ -149,17 +150,18 @@ class MapSeeking {
   void require_usable() const;
 
  private:
-  static constexpr int spread = 20, near = 20, per_place = 1 + spread + near, cloud = 9;
+  static constexpr int spread = 20, near = 20, per_place = 1 + near + spread;
   static constexpr int most_visits = 8;  // of a cell, that are compared
   static constexpr std::int64_t most_again = 2;
-  static constexpr double odd_visit = 12.0;    // squared standard deviations, from which on it is taken again
-  static constexpr double given_up = 3.0;      // failures of a cell in a row, then it is left alone
-  static constexpr double active_room = 0.02;  // scales of a limit
+  static constexpr double odd_visit = 12.0;  // squared standard deviations, from which on it is taken again
+  static constexpr double given_up = 3.0;    // failures of a cell in a row, then it is left alone
 
   struct Place {
     Inputs context, best;  // scaled
     Inputs from;           // that its search begins at, so that it is a function of the readings alone
-    int known = 0;         // candidate that the map gives
+    Climb climb{};
+    double rough = 0.0;  // what the bends at the best cost, as its worth has it
+    int known = 0;       // candidate that the map gives
   };
   /// A second difference of the map along an axis that a cell is part of, in ranges of the inputs, the axis counted in
   /// its mean steps: `own` times the input of the cell, plus those of two others.
@@ -172,6 +174,16 @@ class MapSeeking {
   double roughness(const Place& place, const Inputs& z) const noexcept;
   double worth(int point) const noexcept { return j_.mean(point) - rough_[static_cast<std::size_t>(point)]; }
   void know_roughness(const Place& place, int from, int count, bool counts) noexcept;
+  /// Candidate k of a place: the best one, some near it, then some from everywhere.
+  int point_of(std::size_t c, int k) const noexcept {
+    const int place = static_cast<int>(c);
+    return k <= near ? place * (1 + near) + k : searching_ * (1 + near) + place * spread + k - 1 - near;
+  }
+  int last_point() const noexcept { return searching_ * per_place; }
+  std::size_t place_of(int point) const noexcept {
+    const int far = point - searching_ * (1 + near);
+    return static_cast<std::size_t>(far < 0 ? point / (1 + near) : far / spread);
+  }
   std::span<Place> all_cells() noexcept { return {places_.data(), cells()}; }
   Inputs scaled_context(const Inputs& context) const noexcept;
   Inputs scaled(const Inputs& input) const noexcept;
@@ -180,20 +192,22 @@ class MapSeeking {
   double uniform(std::uint64_t stream, int index) const noexcept;
   double normal(std::uint64_t stream, int index) const noexcept;
   void put(int row, const Inputs& context, const Inputs& z) noexcept;
-  void judge(int points) noexcept;
+  void judge(int points, int from) noexcept;
+  void judge_failing(int points, int from) noexcept;
   bool safe(int point, const Place& place) const noexcept;
   bool known() const noexcept;
-  void scatter(std::span<const Place> places, bool sure) noexcept;
-  void keep_best(Place& place, int from, int count, bool smooth) noexcept;
-  void narrow(std::span<Place> places, bool smooth) noexcept;
+  Climb::Worth worth_of(int point) const noexcept;
+  void consider(Place& place, int from, int count, bool smooth) noexcept;
+  void spread_out(std::span<Place> places) noexcept;
+  void climb(std::span<Place> places, bool smooth) noexcept;
+  void cloud_around(std::span<const Place> places) noexcept;
   void search(std::span<Place> places) noexcept;
   void know_cells() noexcept;
-  void know_edges(std::span<const Place> places) noexcept;
-  void know_likeliest(Place& place, int from) noexcept;
+  void know_likeliest(std::size_t c, Place& place) noexcept;
   void choose_safe(std::span<Place> places) noexcept;
   int visits_of(std::size_t c, std::span<int> out) const noexcept;
   int least_unsafe(std::span<const Place> places) const noexcept;
-  double gain_of(int point) noexcept;
+  double gain_of(int point, const double* covariances) noexcept;
   void sample(std::size_t c, Best& out) noexcept;
   Inputs first_input(const Inputs& context) const noexcept;
   void first_visit() noexcept;
@@ -219,10 +233,12 @@ class MapSeeking {
   Inputs asked_;
   // Scratch: of points, then of cells and limits.
   InputTable candidates_;
-  std::vector<double> over_, cautious_, mean_over_, odds_, rough_, effect_;
+  std::vector<double> over_, cautious_, mean_over_, odds_, rough_;
   std::vector<int> safe_, safe_from_;  // candidates that keep the limits, cell by cell
-  std::vector<double> multipliers_;
-  InputTable edges_, joint_;
+  int searching_ = 0;                  // places at once
+  Inputs aside_;                       // of an input, for slopes
+  std::vector<double> multipliers_, edge_over_, unused_;
+  InputTable edges_, excess_, joint_, effects_;
   WorthScratch worth_;
 };
 

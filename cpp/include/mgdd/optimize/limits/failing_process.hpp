@@ -31,16 +31,16 @@ class FailingProcess {
   struct Demand {
     double quantile, most, room;
   };
-  /// Predicts at the first `points` rows; `judge(excess, mean, point)` takes by how much a point is above the demand.
+  void predict(const InputTable& at, int points, int from = 0) noexcept { model_.predict(at, points, from); }
+  /// `judge(excess, mean, point)` takes by how much a point that was predicted is above the demand.
   template <class Judge>
-  void judge(const InputTable& at, int points, const Demand& demand, const Judge& judge) noexcept {
-    model_.predict(at, points);
+  void judge(int points, int from, const Demand& demand, const Judge& judge) noexcept {
     const auto likely = [&](int p) { return model_.mean(p) + demand.quantile * model_.sd(p); };
     double least = largest_reading;
-    for (int p = 0; p < points; ++p)
+    for (int p = from; p < from + points; ++p)
       least = std::min(least, likely(p));
     const double most = std::max(demand.most, least + demand.room);
-    for (int p = 0; p < points; ++p)
+    for (int p = from; p < from + points; ++p)
       judge(likely(p) - most, model_.mean(p), p);
   }
 
