@@ -88,6 +88,7 @@ TEST(MapSeeking, WhereNoInputIsSafeTheMapGivesTheBestOfThoseThatAreAboutAsLikely
       ++unsafe;
       EXPECT_LT(strict.holds(c, 0), 0.95) << c;
       EXPECT_GE(bold.holds(c, 0), 0.7 * strict.holds(c, 0)) << c;
+      EXPECT_GE(more.expected, least.expected) << c;
       later += more.input[0] - least.input[0];
     }
   }

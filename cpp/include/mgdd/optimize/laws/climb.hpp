@@ -1,6 +1,6 @@
 // A climb to the best input within limits: slopes and bends from points beside the best one so far, then the limited
-// step that gains most by them, a part of it, and the whole one moved back to the limits that it breaks. It slides
-// along several limits at once, where few inputs drawn at random lie inside. noexcept and free of allocation.
+// step that gains most by them, half of it, and both moved back to the limits that they break. It slides along several
+// limits at once, where few inputs drawn at random lie inside. noexcept and free of allocation.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,8 @@ namespace mgdd::optimize {
 
 class Climb {
  public:
-  static constexpr int rounds = 4;        // three inputs, two limits: .0008 points short of forty rounds
-  static constexpr int tries = 2;         // of steps at once: all of it, and a quarter
+  static constexpr int rounds = 4;        // three inputs, two limits: .0002 points short of forty rounds
+  static constexpr int tries = 2;         // of steps at once: all of it, and half
   static constexpr double inside = 1e-4;  // scales of a limit that it stays within: limits bend too
 
   /// What is known of an input: its largest excess over a limit, kept where that is not above 0, and what it is worth.
@@ -104,7 +104,7 @@ class Climb {
   }
 
  private:
-  static constexpr double overshoot = 0.25;   // of what is moved back
+  static constexpr double overshoot = 0.25;   // of what is moved back: limits bend towards it
   static constexpr double farthest = 0.3;     // ranges, of the first step: bends change beyond
   static constexpr double least_bend = 1e-6;  // of the largest: an input that changes limits alone is free to move
 

@@ -214,8 +214,9 @@ class GaussianProcessSeeking {
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
   std::vector<double> effect_, over_, mean_over_;
-  std::vector<double> excess_, multipliers_, holding_,
-      credit_;  // of every limit at the candidates; J per scale of a limit
+  std::vector<double> excess_;                 // of every limit at the candidates
+  std::vector<double> multipliers_, holding_;  // J per scale of a limit; 0 where one holds the best input back
+  std::vector<double> credit_;
   std::vector<int> order_;
   WorthScratch worth_;
 };
