@@ -70,9 +70,11 @@ def plate_of(given: Any) -> Plate:
     meant = model_of(given)
     if isinstance(meant, PseudoWiener):  # its delay is the loop's
         return Plate(meant.replace(delay_samples=0.0), meant)
+    if isinstance(meant, Throttle):
+        return Plate(*moving_throttle_of(meant))
     if isinstance(meant, PlatePlant) and not isinstance(meant, type):
         return Plate(meant)
-    if callable(getattr(meant, "step", None)) and not isinstance(meant, Throttle):
+    if callable(getattr(meant, "step", None)):
         raise ParameterError(
             f"throttle = {shown(given)}: must have `output`, the angle now [deg], beside step(duty)", field="throttle"
         )
