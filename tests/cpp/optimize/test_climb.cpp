@@ -1,4 +1,4 @@
-// Laws of the limited step and of the climb that is made of it, on functions of their own.
+// Laws of the climb, on functions of its own.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -12,45 +12,6 @@
 
 namespace mgdd::optimize {
 namespace {
-
-double drawn(std::uint64_t stream, std::uint64_t index) {
-  return random::normal(7, stream, index);
-}
-
-// Karush, Kuhn and Tucker: nothing is broken, nothing pushes that does not hold, and what pushes balances the rise.
-TEST(LimitedStep, IsTheOptimumOfItsProgram) {
-  for (std::uint64_t k = 0; k < 200; ++k) {
-    const Eigen::Index n = 1 + static_cast<Eigen::Index>(k % 4), m = static_cast<Eigen::Index>(k % 3);
-    Inputs rise(n), bend(n), low(n), high(n);
-    InputTable edges(m, n);
-    std::vector<double> over(static_cast<std::size_t>(m)), multipliers(over);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const auto stream = static_cast<std::uint64_t>(10 * i);
-      rise[i] = drawn(stream, k);
-      bend[i] = std::exp(drawn(stream + 1, k));
-      low[i] = -0.1 - 0.4 * random::uniform(7, stream + 2, k);
-      high[i] = 0.1 + 0.4 * random::uniform(7, stream + 3, k);
-      for (Eigen::Index j = 0; j < m; ++j)
-        edges(j, i) = drawn(stream + 4 + static_cast<std::uint64_t>(j), k);
-    }
-    for (double& own : over)  // the point itself keeps them
-      own = -0.3 * random::uniform(7, 99, k);
-    const Inputs step = limited_step(rise, bend, edges, over, low, high, std::span(multipliers));
-    Inputs left = rise - bend.cwiseProduct(step);
-    for (Eigen::Index j = 0; j < m; ++j) {
-      const auto at = static_cast<std::size_t>(j);
-      const double excess = over[at] + edges.row(j).dot(step);
-      EXPECT_LE(excess, 1e-3) << k;
-      EXPECT_GE(multipliers[at], 0.0) << k;
-      EXPECT_NEAR(multipliers[at] * excess, 0.0, 2e-3) << k;
-      left -= multipliers[at] * edges.row(j).transpose();
-    }
-    for (Eigen::Index i = 0; i < n; ++i) {
-      EXPECT_GE(left[i], step[i] < low[i] + 1e-4 ? -unlimited : -5e-3) << k;
-      EXPECT_LE(left[i], step[i] > high[i] - 1e-4 ? unlimited : 5e-3) << k;
-    }
-  }
-}
 
 // J of three inputs, whose best is held back by a sphere and a plane that meet; `unit` of J.
 struct Corner {
@@ -80,19 +41,20 @@ struct Corner {
       Climb climb;
       climb.begin(from, known(from));
       for (int round = 0; round < Climb::rounds; ++round) {
-        std::array<double, 2> over{}, multipliers{}, unused{};
+        std::array<double, 2> over{};
+        NearestStep nearest(2);
         InputTable edges(2, 3);
         for (int i = 0; i < 2; ++i) {
           climb.slopes(aside, [&](int k) { return excess(i, climb.beside(k, aside)); }, edges.row(i));
           over[static_cast<std::size_t>(i)] = excess(i, climb.best()) + Climb::inside;
         }
-        climb.aim(aside, [&](int k) { return worth(climb.beside(k, aside)); }, edges, over, std::span(multipliers));
+        climb.aim(aside, [&](int k) { return worth(climb.beside(k, aside)); }, edges, over, nearest);
         for (int k = 0; k < Climb::tries; ++k) {
           const Inputs tried = climb.tried(k);
           climb.consider(tried, known(tried));
           for (int i = 0; i < 2; ++i)
             over[static_cast<std::size_t>(i)] = excess(i, tried) + Climb::inside;
-          const Inputs back = climb.moved_back(k, edges, over, std::span(unused));
+          const Inputs back = climb.moved_back(k, edges, over, nearest);
           climb.consider(back, known(back));
         }
         climb.narrow();
@@ -115,53 +77,79 @@ TEST(Climb, SlidesIntoTheCornerWhereTwoLimitsMeet) {
   }
 }
 
-// The same with an operating point, which moves the plane, by noisy readings, with a guide that lies elsewhere.
-TEST(Climb, BringsASearchForAMapIntoTheCorners) {
-  const Corner corner;
-  const auto plane = [&](double load, const Inputs& z) { return corner.excess(1, z) - 0.1 * load; };
-  const auto inputs = [](double a, double b, double c) {
-    Inputs out(3);
-    out << a, b, c;
+// The same with an operating point, which moves the plane, by noisy readings.
+struct Corners {
+  const Corner corner{};
+  double plane(double load, const Inputs& z) const { return corner.excess(1, z) - 0.1 * load; }
+
+  MapSeekingSettings settings(std::uint64_t seed) const {
+    MapSeekingSettings out;
+    out.space = {Inputs::Constant(3, 0.2), Inputs::Zero(3), Inputs::Ones(3)};
+    out.context = {{"load", 0.0, 1.0}};
+    out.axes = {{0.0, 0.4, 1.0}};
+    out.limits = {{.name = "sphere"}, {.name = "plane"}};
+    out.seed = seed;
     return out;
-  };
-  const auto guide = [&](const auto& value) {
+  }
+  // A guide that lies elsewhere.
+  static Surface surface(const auto& value) {
     std::vector<double> nodes, values;
     for (int k = 0; k <= 8; ++k)
       nodes.push_back(k / 8.0);
     for (const double load : {0.0, 1.0}) {
       for (const double a : nodes) {
         for (const double b : nodes) {
-          for (const double c : nodes)
-            values.push_back(value(load, inputs(a - 0.05, b, c)));
+          for (const double c : nodes) {
+            Inputs z(3);
+            z << a - 0.05, b, c;
+            values.push_back(value(load, z));
+          }
         }
       }
     }
     return Surface({{0.0, 1.0}, nodes, nodes, nodes}, values);
-  };
-  MapSeekingSettings own;
-  own.space = {Inputs::Constant(3, 0.2), Inputs::Zero(3), Inputs::Ones(3)};
-  own.context = {{"load", 0.0, 1.0}};
-  own.axes = {{0.0, 0.4, 1.0}};
-  own.limits = {{.name = "sphere"}, {.name = "plane"}};
-  own.guide = {guide([&](double, const Inputs& z) { return 1.3 * corner.worth(z); })};
-  own.limit_guides = {guide([&](double, const Inputs& z) { return corner.excess(0, z); }), guide(plane)};
-  for (std::uint64_t seed = 0; seed < 3; ++seed) {
-    own.seed = seed;
-    MapSeeking search(own);
-    for (std::uint64_t k = 0; k < 40; ++k) {
+  }
+  // The largest loss of a cell; no cell and no visit is above a limit by more.
+  double lost(MapSeeking& search, std::uint64_t visits, double above) const {
+    const std::uint64_t seed = search.settings().seed;
+    for (std::uint64_t k = 0; k < visits; ++k) {
       const MapSeeking::Visit visit = search.suggest();
       const auto read = [&](double value, std::uint64_t what) { return value + 2e-3 * random::normal(seed, what, k); };
+      const double sphere = corner.excess(0, visit.input), flat = plane(visit.context[0], visit.input);
+      EXPECT_LE(std::max(sphere, flat), above) << seed << ' ' << k;
       const std::array<double, 1> j{read(corner.worth(visit.input), 90)};
-      const std::array<double, 2> limits{read(corner.excess(0, visit.input), 91),
-                                         read(plane(visit.context[0], visit.input), 92)};
+      const std::array<double, 2> limits{read(sphere, 91), read(flat, 92)};
       search.tell(visit.context, visit.input, {.components = j, .limits = limits});
     }
+    double out = 0.0;
     for (std::size_t c = 0; c < search.cells(); ++c) {
       const double load = search.cell(c)[0];
       const Inputs z = search.best(c).input;
       EXPECT_LE(std::max(corner.excess(0, z), plane(load, z)), 2e-3) << seed << ' ' << load;
-      EXPECT_LE(corner.most(0.1 * load) - corner.worth(z), 0.008) << seed << ' ' << load << ": " << z.transpose();
+      out = std::max(out, corner.most(0.1 * load) - corner.worth(z));
     }
+    return out;
+  }
+};
+
+TEST(Climb, BringsASearchForAMapIntoTheCorners) {
+  const Corners own;
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    MapSeekingSettings settings = own.settings(seed);
+    settings.guide = {Corners::surface([&](double, const Inputs& z) { return 1.3 * own.corner.worth(z); })};
+    settings.limit_guides = {Corners::surface([&](double, const Inputs& z) { return own.corner.excess(0, z); }),
+                             Corners::surface([&](double load, const Inputs& z) { return own.plane(load, z); })};
+    MapSeeking search(settings);
+    EXPECT_LE(own.lost(search, 40, 2e-3), 0.008) << seed;
+  }
+}
+
+// Without a guide readings at two loads may leave every input at the third in doubt: it is read all the same.
+TEST(MapSeeking, ACellWhereNothingMayBeAskedIsEnteredOnceTheOthersAreKnown) {
+  const Corners own;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    MapSeeking search(own.settings(seed));
+    EXPECT_LE(own.lost(search, 60, 0.1), 0.02) << seed;
   }
 }
 
@@ -170,7 +158,8 @@ TEST(Climb, StaysWhereNothingIsToBeGained) {
   const Inputs at = Inputs::Constant(2, 0.25), aside = Inputs::Constant(2, 0.01);
   climb.begin(at, {-1.0, 3.0});
   std::array<double, 0> none{};
-  climb.aim(aside, [](int) { return 3.0; }, InputTable(0, 2), none, std::span<double>(none));
+  NearestStep nearest(0);
+  climb.aim(aside, [](int) { return 3.0; }, InputTable(0, 2), none, nearest);
   EXPECT_EQ(climb.tried(0), at);
   climb.consider(Inputs::Constant(2, 0.5), {-1.0, 3.0});
   EXPECT_EQ(climb.best(), at);

@@ -260,6 +260,31 @@ TEST(NearestStep, NoAllowedStepIsNearer) {
   EXPECT_GT(turned, 250);
 }
 
+// The multipliers: none below 0, none where there is room, and with those of the box they make up for the wish.
+TEST(NearestStep, TellsWhatEveryLimitCosts) {
+  int pushing = 0;
+  for (std::uint64_t trial = 0; trial < 400; ++trial) {
+    const Problem problem(trial, static_cast<Eigen::Index>(1 + trial % 4), 1 + trial % 3);
+    NearestStep nearest(problem.slopes.size());
+    problem.begin(nearest);
+    nearest.solve(0.0);
+    const Inputs x = nearest.step();
+    Inputs left = problem.metric.llt().solve(problem.wish - x);
+    for (std::size_t l = 0; l < problem.slopes.size(); ++l) {
+      const double own = nearest.multiplier(l), room = problem.rooms[l] - problem.slopes[l].dot(x);
+      EXPECT_GE(own, 0.0) << trial;
+      EXPECT_NEAR(own * room, 0.0, 1e-6 * (1.0 + own)) << trial;
+      left -= own * problem.slopes[l];
+      pushing += own > 1e-3 ? 1 : 0;
+    }
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      EXPECT_GE(left[i], x[i] > problem.lowest[i] + 1e-6 ? -1e-4 : -unlimited) << trial;
+      EXPECT_LE(left[i], x[i] < problem.highest[i] - 1e-6 ? 1e-4 : unlimited) << trial;
+    }
+  }
+  EXPECT_GT(pushing, 100);
+}
+
 TEST(NearestStep, WhatContradictsIsBrokenEvenlyInScales) {
   NearestStep nearest(2);
   const Inputs none = Inputs::Constant(1, unlimited);
@@ -271,12 +296,15 @@ TEST(NearestStep, WhatContradictsIsBrokenEvenlyInScales) {
 }
 
 TEST(NearestStep, ALimitThatSaysNothingIsNoLimit) {
-  NearestStep nearest(1);
+  NearestStep nearest(2);
   const Inputs none = Inputs::Constant(2, unlimited), wish = inputs({2.0, -1.0});
   nearest.begin(wish, InputMatrix::Identity(2, 2), -none, none);
-  nearest.add(Inputs::Zero(2), -1.0, 1.0);
+  nearest.add(Inputs::Zero(2), -1.0);
+  nearest.add(inputs({0.0, -1.0}), 0.25);
   EXPECT_EQ(nearest.solve(1.0), 0.0);
-  EXPECT_EQ(nearest.step(), wish);
+  EXPECT_EQ(nearest.step(), inputs({2.0, -0.25}));
+  EXPECT_EQ(nearest.multiplier(0), 0.0);
+  EXPECT_EQ(nearest.multiplier(1), 0.75);
 }
 
 }  // namespace

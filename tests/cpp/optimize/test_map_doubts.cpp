@@ -46,24 +46,26 @@ TEST(MapSeeking, AnOddVisitIsMadeAgainAndDoesNotSpoilTheMap) {
 
 TEST(MapSeeking, ATrueSurpriseIsBelievedOnceItIsReadTwice) {
   const Plant plant, worn{.octane = 0.0, .mbt_shift = 0.0, .scale = 0.85};
-  MapSeeking search(settings(7, &plant));
-  visited(search, plant, 8, 7);
-  int repeats = 0;
-  MapSeeking::Visit before = search.suggest();
-  for (std::uint64_t k = 0; k < 12; ++k) {
-    read(search, worn, before.context, before.input, 700 + k);
-    const MapSeeking::Visit next = search.suggest();
-    repeats += next.context == before.context && next.input == before.input ? 1 : 0;
-    before = next;
-  }
-  EXPECT_GE(repeats, 1);
-  EXPECT_LE(repeats, 6);
   double off = 0.0;
-  for (std::size_t c = 0; c < search.cells(); ++c) {
-    const MapSeeking::Best best = search.best(c);
-    off += std::abs(best.expected - worn.torque(search.cell(c), best.input[0])) / 12.0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    MapSeeking search(settings(seed, &plant));
+    visited(search, plant, 8, seed);
+    int repeats = 0;
+    MapSeeking::Visit before = search.suggest();
+    for (std::uint64_t k = 0; k < 12; ++k) {
+      read(search, worn, before.context, before.input, 100 * seed + k);
+      const MapSeeking::Visit next = search.suggest();
+      repeats += next.context == before.context && next.input == before.input ? 1 : 0;
+      before = next;
+    }
+    EXPECT_GE(repeats, 1) << seed;
+    EXPECT_LE(repeats, 6) << seed;
+    for (std::size_t c = 0; c < search.cells(); ++c) {
+      const MapSeeking::Best best = search.best(c);
+      off += std::abs(best.expected - worn.torque(search.cell(c), best.input[0])) / 96.0;
+    }
   }
-  EXPECT_LT(off, 5.0);  // N m of the 16 that it has lost
+  EXPECT_LT(off, 8.0);  // N m of the 16 that it has lost
 }
 
 TEST(MapSeeking, WhereNoInputIsSafeTheMapGivesTheBestOfThoseThatAreAboutAsLikelyToBe) {

@@ -152,7 +152,6 @@ void ProcessModel::predict(const InputTable& at, int points, int from) noexcept 
   factor_.topLeftCorner(count_, count_)
       .triangularView<Eigen::Lower>()
       .solveInPlace(kernels_.block(from, 0, points, count_).transpose());
-  asked_columns_.middleCols(from, points) = asked_.middleRows(from, points).transpose();
 }
 
 void ProcessModel::predict_means(const InputTable& at, int points, int from) noexcept {
@@ -166,21 +165,22 @@ void ProcessModel::predict_means(const InputTable& at, int points, int from) noe
 }
 
 // Eight at a time, so that what is known of a point is fetched once for all of them.
-void ProcessModel::covariances(std::span<const int> of, int points, InputTable& out) noexcept {
+void ProcessModel::covariances(std::span<const int> of, std::span<const int> with, InputTable& out) noexcept {
+  const auto others = static_cast<Eigen::Index>(with.size());
+  for (Eigen::Index k = 0; k < others; ++k)
+    asked_columns_.col(k) = asked_.row(with[static_cast<std::size_t>(k)]).transpose();
   for (std::size_t first = 0; first < of.size(); first += together) {
     const auto some = static_cast<Eigen::Index>(std::min<std::size_t>(together, of.size() - first));
     for (Eigen::Index k = 0; k < some; ++k) {
       const int own = of[first + static_cast<std::size_t>(k)];
       together_.row(k).head(count_) = kernels_.row(own).head(count_);
       double* const row = &out(static_cast<Eigen::Index>(first) + k, 0);
-      for (int from = 0; from < points; from += most_kept) {
-        const int part = std::min(most_kept, points - from);
-        kernel_.covariances(&asked_(own, 0), asked_columns_.middleCols(from, part), part, now_, row + from);
-      }
+      kernel_.covariances(&asked_(own, 0), asked_columns_, others, now_, row);
     }
-    for (int p = 0; p < points; ++p) {
+    for (Eigen::Index p = 0; p < others; ++p) {
       Eigen::Matrix<double, Eigen::Dynamic, 1, 0, together, 1> both(some);
-      both.noalias() = together_.topLeftCorner(some, count_) * kernels_.row(p).head(count_).transpose();
+      both.noalias() = together_.topLeftCorner(some, count_) *
+                       kernels_.row(with[static_cast<std::size_t>(p)]).head(count_).transpose();
       for (Eigen::Index k = 0; k < some; ++k)
         out(static_cast<Eigen::Index>(first) + k, p) -= both[k];
     }

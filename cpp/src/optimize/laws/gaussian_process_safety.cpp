@@ -4,7 +4,6 @@
 
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "mgdd/optimize/laws/process_laws.hpp"
-#include "mgdd/optimize/limits/limited_step.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -78,7 +77,7 @@ bool GaussianProcessSeeking::pull_back(int points) noexcept {
         const auto edge = edges_.row(static_cast<Eigen::Index>(i));
         const double off = excess_[i * candidates + static_cast<std::size_t>(p)] + edge.dot(step) + inside_edge;
         const double steep = edge.squaredNorm();
-        if (off > inside_edge * 0.5 && steep > least_slope * least_slope) step -= off / steep * edge.transpose();
+        if (off > inside_edge * 0.5 && steep > 0.0) step -= off / steep * edge.transpose();
       }
     }
     const double far = step.norm();
@@ -116,16 +115,21 @@ void GaussianProcessSeeking::know_edge(const Inputs& at) noexcept {
   std::fill(multipliers_.begin(), multipliers_.end(), 0.0);
   edges_.setZero();
   judge_safety(points, quantile_);
-  for (std::size_t i = 0; i < limited_.size(); ++i)
-    slopes(limited_[i].model(), edges_.row(static_cast<Eigen::Index>(i)), settings_.limits[i].scale);
   Inputs low = Inputs::Constant(n, -unlimited), high = -low;
   for (Eigen::Index k = 0; k < n; ++k) {
     if (at[k] < at_bound) low[k] = 0.0;
     if (at[k] > 1.0 - at_bound) high[k] = 0.0;
   }
+  nearest_.begin(rest, InputMatrix::Identity(n, n), low, high);
+  for (std::size_t i = 0; i < limited_.size(); ++i) {
+    auto edge = edges_.row(static_cast<Eigen::Index>(i));
+    slopes(limited_[i].model(), edge, settings_.limits[i].scale);
+    edge = pointing(edge.transpose()).transpose();
+    nearest_.add(edge.transpose(), excess_[i * candidates] > -active_room ? 0.0 : unlimited);
+  }
+  nearest_.solve(0.0);
   for (std::size_t i = 0; i < limited_.size(); ++i)
-    holding_[i] = excess_[i * candidates] > -active_room ? 0.0 : -unlimited;
-  limited_step(rest, Inputs::Ones(n), edges_, holding_, low, high, multipliers_);
+    multipliers_[i] = nearest_.multiplier(i);
 }
 
 }  // namespace mgdd::optimize

@@ -105,8 +105,8 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       mean_over_(candidates, 0.0),
       excess_(settings_.limits.size() * candidates, 0.0),
       multipliers_(room_),
-      holding_(room_),
       credit_(candidates, 0.0),
+      nearest_(settings_.limits.size()),
       order_(candidates, 0),
       worth_(candidates) {
   double longest = 0.0;

@@ -112,7 +112,8 @@ int MapSeeking::visits_of(std::size_t c, std::span<int> out) const noexcept {
   return static_cast<int>(count);
 }
 
-// By what a reading at a candidate is expected to raise the J of all cells.
+// By what a reading at a candidate, of those covariances with all that are safe, is expected to raise the J of all
+// cells.
 double MapSeeking::gain_of(int point, const double* covariances) noexcept {
   const double sd = std::hypot(j_.sd(point), j_.noise_sd() / std::sqrt(settings_.averaged));
   if (!(sd > 0.0)) return 0.0;
@@ -121,9 +122,8 @@ double MapSeeking::gain_of(int point, const double* covariances) noexcept {
     const auto from = static_cast<std::size_t>(safe_from_[c]), n = static_cast<std::size_t>(safe_from_[c + 1]) - from;
     const std::span<double> means(worth_.mean.data(), n), effects(worth_.effect.data(), n);
     for (std::size_t k = 0; k < n; ++k) {
-      const int p = safe_[from + k];
-      means[k] = worth(p);
-      effects[k] = covariances[p] / sd;
+      means[k] = worth(safe_[from + k]);
+      effects[k] = covariances[from + k] / sd;
     }
     const auto [least, most] = std::ranges::minmax(effects);
     if (most - least < least_effect * sd) continue;
@@ -162,28 +162,35 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     visit_ = {last_context_, within, 0.0, j_.sd(0)};
     return visit_;
   }
+  const std::span<const int> all_safe(safe_.data(), static_cast<std::size_t>(safe_from_[cells()]));
   double most = -1.0;
   int next = -1;
   for (std::size_t c = 0; c < cells(); ++c) {
+    places_[c].closed = false;
     if (failures_[c] >= given_up) continue;
     std::array<int, most_visits> visits{};
     const int count = visits_of(c, visits);
-    const double works = std::pow(by_chance, failures_[c]);  // that a cell which has failed so often does
-    j_.covariances(std::span(visits).first(static_cast<std::size_t>(count)), last_point(), effects_);
+    if (count == 0) places_[c].closed = true;
+    j_.covariances(std::span(visits).first(static_cast<std::size_t>(count)), all_safe, effects_);
     const bool elsewhere = (cell(c) - last_context_).cwiseAbs().maxCoeff() > 0.0;
+    const double works = std::pow(by_chance, failures_[c]);  // that a cell which has failed so often does
+    const double counts = elsewhere ? works / (1.0 + settings_.moving_cost) : works;
     for (int k = 0; k < count; ++k) {
       const int p = visits[static_cast<std::size_t>(k)];
-      const double gain = gain_of(p, &effects_(k, 0)),
-                   worth = works * (elsewhere ? gain / (1.0 + settings_.moving_cost) : gain);
-      if (worth <= most) continue;
-      most = worth;
+      const double gain = gain_of(p, &effects_(k, 0));
+      if (counts * gain <= most) continue;
+      most = counts * gain;
       next = p;
       visit_.gain = gain;
     }
   }
-  if (next < 0) {
-    next = least_unsafe(all_cells());
-    visit_.gain = 0.0;
+  // Cells without an input that may be asked are entered once nothing more than noise is to be learnt elsewhere.
+  if (next < 0 || visit_.gain < j_.noise_sd() / std::sqrt(settings_.averaged)) {
+    const int entered = least_unsafe(all_cells());
+    if (next < 0 || (entered >= 0 && mean_over_[static_cast<std::size_t>(entered)] <= 0.0)) {
+      next = std::max(entered, 0);
+      visit_.gain = 0.0;
+    }
   }
   visit_.sd = j_.sd(next);
   visit_.context = cell(place_of(next));
@@ -216,11 +223,11 @@ const Inputs& MapSeeking::ask(const Inputs& context) noexcept {
   }
   int next = 0;
   if (count == 0) {
-    next = least_unsafe(places);
+    next = std::max(least_unsafe(places), 0);
   } else {
     std::array<int, per_place> all{};
     std::iota(all.begin(), all.end(), 0);
-    j_.covariances(all, per_place, joint_);
+    j_.covariances(all, all, joint_);
     const double noise = std::max(j_.noise_sd(), worth_noise * std::abs(j_.mean(0)));
     const double read = static_cast<double>(j_.count()) / (cautious_readings * static_cast<double>(1 + inputs_));
     next = most_worth(

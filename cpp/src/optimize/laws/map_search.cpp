@@ -167,9 +167,9 @@ void MapSeeking::climb(std::span<Place> places, bool smooth) noexcept {
         own.slopes(aside_, [&](int k) { return excess_(i, at + k); }, edges.row(i));
       own.renew(worth_of(at));
       places[c].rough = rough_[static_cast<std::size_t>(at)];
-      own.aim(
-          aside_, [&](int k) { return worth(at + k); }, edges, over_at(at),
-          std::span(multipliers_).subspan(c * limited_.size(), limited_.size()));
+      own.aim(aside_, [&](int k) { return worth(at + k); }, edges, over_at(at), nearest_);
+      for (std::size_t i = 0; i < limited_.size(); ++i)
+        multipliers_[c * limited_.size() + i] = nearest_.multiplier(i);
       if (steps_.any()) consider(places[c], at, star, smooth);
     }
     for (const bool back : {false, true}) {
@@ -177,7 +177,7 @@ void MapSeeking::climb(std::span<Place> places, bool smooth) noexcept {
       for (std::size_t c = 0; c < places.size(); ++c) {
         const Climb& own = places[c].climb;
         for (int k = 0; k < Climb::tries; ++k, ++row)
-          put(row, places[c].context, back ? own.moved_back(k, edges_of(c), over_at(row), unused_) : own.tried(k));
+          put(row, places[c].context, back ? own.moved_back(k, edges_of(c), over_at(row), nearest_) : own.tried(k));
       }
       take(Climb::tries);
       for (std::size_t c = 0; c < places.size(); ++c)
@@ -275,15 +275,15 @@ bool MapSeeking::safe(int point, const Place& place) const noexcept {
          (z - towards).cwiseAbs().maxCoeff() <= settings_.reach;
 }
 
-// Where nothing is safe: not far from what was read, the one that most likely keeps its limits.
+// Of places where no input may be asked, not far from what was read: the one that most likely keeps its limits, or -1.
 int MapSeeking::least_unsafe(std::span<const Place> places) const noexcept {
-  int best = 0;
+  int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (int p = 0; p < last_point(); ++p) {
     const Inputs z = candidates_.row(p).tail(inputs_).transpose();
     const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
     const double own = mean_over_[static_cast<std::size_t>(p)];
-    if (places.size() == cells() && failures_[place_of(p)] >= given_up) continue;
+    if (!places[place_of(p)].closed) continue;
     if (beyond > reach_beyond_read * settings_.reach || own >= least) continue;
     least = own;
     best = p;

@@ -159,7 +159,7 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
       candidates_(InputTable::Zero(points_of(settings_, per_place), context_ + inputs_)),
       multipliers_(places_.size() * limited_.size(), 0.0),
       edge_over_(limited_.size(), 0.0),
-      unused_(edge_over_),
+      nearest_(limited_.size()),
       edges_(InputTable::Zero(static_cast<Eigen::Index>(multipliers_.size()), inputs_)),
       excess_(InputTable::Zero(static_cast<Eigen::Index>(limited_.size()), candidates_.rows())),
       joint_(per_place, per_place),

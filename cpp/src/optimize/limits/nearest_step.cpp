@@ -26,13 +26,12 @@ void NearestStep::begin(const Inputs& wish, const InputMatrix& metric, const Inp
 }
 
 void NearestStep::add(const Inputs& slope, double room, double scale) noexcept {
-  Plane& plane = planes_[count_];
+  Plane& plane = planes_[count_++];
   plane.slope = slope;
   plane.turned.noalias() = metric_ * slope;
   plane.size = slope.dot(plane.turned);
   plane.room = room;
   plane.scale = scale;
-  if (plane.size > 0.0) ++count_;
 }
 
 // The step is wish - metric * (sum of slopes times multipliers): each multiplier in turn, as often as anything moves.
@@ -54,6 +53,7 @@ bool NearestStep::ascend(double relaxation, int most_passes) noexcept {
     };
     for (std::size_t p = 0; p < count_; ++p) {
       Plane& plane = planes_[p];
+      if (!(plane.size > 0.0)) continue;
       const double over = plane.slope.dot(step_) - plane.room - relaxation * plane.scale;
       push(plane.multiplier, over, plane.size, plane.turned);
     }
@@ -74,6 +74,7 @@ double NearestStep::worst_excess(double relaxation) const noexcept {
   double worst = 0.0;
   for (std::size_t p = 0; p < count_; ++p) {
     const Plane& plane = planes_[p];
+    if (!(plane.size > 0.0)) continue;
     worst = std::max(worst, (plane.slope.dot(step) - plane.room) / plane.scale - relaxation);
   }
   return worst;

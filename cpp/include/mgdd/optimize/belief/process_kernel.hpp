@@ -62,7 +62,7 @@ class ProcessKernel {
   double covariance(const double* a, const double* b, const Scales& s) const noexcept {
     return join(fixed(a, b), matern(a, b, s.inverse_length), s);
   }
-  /// The same of one point with `count` others, whose descriptions are columns of a table; `most_kept` at most.
+  /// The same of one point with `count` others, whose descriptions are columns of a table.
   void covariances(const double* point, const Columns& others, Eigen::Index count, const Scales& s,
                    double* out) const noexcept;
 

@@ -69,8 +69,8 @@ class ProcessModel {
   double widening(Eigen::Index freedom) const noexcept {
     return 1.0 + few_readings / std::max(1.0, static_cast<double>(count_ - freedom));
   }
-  /// The same of each of some of them with the first `points`, a row each.
-  void covariances(std::span<const int> of, int points, InputTable& out) noexcept;
+  /// The same of each of some of them with each of others, a row each.
+  void covariances(std::span<const int> of, std::span<const int> with, InputTable& out) noexcept;
 
   /// What the bend, where readings leave it open, makes of the prediction at `z`: to be added to mean and variance.
   struct Correction {

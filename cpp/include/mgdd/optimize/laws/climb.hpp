@@ -7,7 +7,7 @@
 #include <cmath>
 #include <span>
 
-#include "mgdd/optimize/limits/limited_step.hpp"
+#include "mgdd/optimize/limits/nearest_step.hpp"
 
 namespace mgdd::optimize {
 
@@ -63,10 +63,10 @@ class Climb {
       out[i] = (value(first) - value(other)) / (beside(first, aside)[i] - beside(other, aside)[i]);
     }
   }
-  /// The step that gains most, from the worth and the excesses at the star.
+  /// The step that gains most, from the worth and the excesses at the star; `nearest` then tells what each limit costs.
   template <class Value, class Edges>
   void aim(const Inputs& aside, const Value& value, const Edges& edges, std::span<const double> over,
-           std::span<double> multipliers) noexcept {
+           NearestStep& nearest) noexcept {
     from_ = best_;
     Inputs rise(best_.size());
     slopes(aside, value, rise);
@@ -84,17 +84,20 @@ class Climb {
     bent_ = bend_.cwiseMax(rise.cwiseAbs() / (2.0 * far_));
     const double most = bent_.maxCoeff();
     bent_ = bent_.cwiseMax(most > 0.0 ? least_bend * most : 1.0);
-    step_ = limited_step(rise, bent_, edges, over, lowest(), highest(), multipliers);
+    nearest.begin(rise.cwiseQuotient(bent_), bent_.cwiseInverse().asDiagonal(), lowest(), highest());
+    step_ = limited(nearest, edges, over);
   }
   /// Try k of the steps.
   Inputs tried(int k) const noexcept { return from_ + std::ldexp(1.0, -k) * step_; }
   /// The same moved back to the limits, by the excesses there.
   template <class Edges>
-  Inputs moved_back(int k, const Edges& edges, std::span<double> over, std::span<double> scratch) const noexcept {
-    const Inputs at = tried(k), none = Inputs::Zero(at.size());
+  Inputs moved_back(int k, const Edges& edges, std::span<double> over, NearestStep& nearest) const noexcept {
+    const Inputs at = tried(k);
     for (double& own : over)
       own += overshoot * std::max(own, 0.0);
-    return at + limited_step(none, bent_, edges, over, from_ + lowest() - at, from_ + highest() - at, scratch);
+    nearest.begin(Inputs::Zero(at.size()), bent_.cwiseInverse().asDiagonal(), from_ + lowest() - at,
+                  from_ + highest() - at);
+    return at + limited(nearest, edges, over);
   }
   /// After the steps have been considered.
   void narrow() noexcept {
@@ -108,6 +111,13 @@ class Climb {
   static constexpr double farthest = 0.3;     // ranges, of the first step: bends change beyond
   static constexpr double least_bend = 1e-6;  // of the largest: an input that changes limits alone is free to move
 
+  template <class Edges>
+  static const Inputs& limited(NearestStep& nearest, const Edges& edges, std::span<const double> over) noexcept {
+    for (std::size_t i = 0; i < over.size(); ++i)
+      nearest.add(pointing(edges.row(static_cast<Eigen::Index>(i)).transpose()), -over[i]);
+    nearest.solve(0.0);
+    return nearest.step();
+  }
   Inputs lowest() const noexcept { return (-from_).cwiseMax(-far_); }
   Inputs highest() const noexcept { return (1.0 - from_.array()).min(far_); }
 

@@ -26,6 +26,7 @@
 #include "mgdd/optimize/laws/most_worth.hpp"
 #include "mgdd/optimize/limits/failing_process.hpp"
 #include "mgdd/optimize/limits/limit_process.hpp"
+#include "mgdd/optimize/limits/nearest_step.hpp"
 #include "mgdd/optimize/watch/causing_inputs.hpp"
 #include "mgdd/optimize/watch/delay_finder.hpp"
 #include "mgdd/optimize/watch/lag_window.hpp"
@@ -214,9 +215,9 @@ class GaussianProcessSeeking {
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
   std::vector<double> effect_, over_, mean_over_;
-  std::vector<double> excess_;                 // of every limit at the candidates
-  std::vector<double> multipliers_, holding_;  // J per scale of a limit; 0 where one holds the best input back
-  std::vector<double> credit_;
+  std::vector<double> excess_;                // of every limit at the candidates
+  std::vector<double> multipliers_, credit_;  // J per scale of a limit
+  NearestStep nearest_;
   std::vector<int> order_;
   WorthScratch worth_;
 };

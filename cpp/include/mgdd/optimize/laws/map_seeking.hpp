@@ -150,8 +150,8 @@ class MapSeeking {
   void require_usable() const;
 
  private:
-  static constexpr int spread = 20, near = 20, per_place = 1 + near + spread;
-  static constexpr int most_visits = 8;  // of a cell, that are compared
+  static constexpr int spread = 20, near = 12, per_place = 1 + near + spread;
+  static constexpr int most_visits = 6;  // of a cell, that are compared
   static constexpr std::int64_t most_again = 2;
   static constexpr double odd_visit = 12.0;  // squared standard deviations, from which on it is taken again
   static constexpr double given_up = 3.0;    // failures of a cell in a row, then it is left alone
@@ -162,6 +162,7 @@ class MapSeeking {
     Climb climb{};
     double rough = 0.0;  // what the bends at the best cost, as its worth has it
     int known = 0;       // candidate that the map gives
+    bool closed = true;  // no input may be asked there
   };
   /// A second difference of the map along an axis that a cell is part of, in ranges of the inputs, the axis counted in
   /// its mean steps: `own` times the input of the cell, plus those of two others.
@@ -237,7 +238,8 @@ class MapSeeking {
   std::vector<int> safe_, safe_from_;  // candidates that keep the limits, cell by cell
   int searching_ = 0;                  // places at once
   Inputs aside_;                       // of an input, for slopes
-  std::vector<double> multipliers_, edge_over_, unused_;
+  std::vector<double> multipliers_, edge_over_;
+  NearestStep nearest_;
   InputTable edges_, excess_, joint_, effects_;
   WorthScratch worth_;
 };

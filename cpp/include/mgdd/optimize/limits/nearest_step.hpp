@@ -10,6 +10,12 @@
 
 namespace mgdd::optimize {
 
+/// A slope of a limit in its scale per range of an input; one flatter than this points nowhere, and is none.
+inline Inputs pointing(const Inputs& slope) noexcept {
+  constexpr double least = 1e-3;
+  return slope.squaredNorm() > least * least ? slope : Inputs(Inputs::Zero(slope.size()));
+}
+
 class NearestStep {
  public:
   explicit NearestStep(std::size_t limits);
@@ -18,11 +24,13 @@ class NearestStep {
   void begin(const Inputs& wish, const InputMatrix& metric, const Inputs& lowest, const Inputs& highest) noexcept;
   /// slope . step <= room + relaxation * scale. At most as many as the constructor was told; a slope of zero is no
   /// limit.
-  void add(const Inputs& slope, double room, double scale) noexcept;
+  void add(const Inputs& slope, double room, double scale = 1.0) noexcept;
 
   /// Solves for the smallest relaxation up to `most` that lets a step exist; returns that relaxation.
   double solve(double most) noexcept;
   const Inputs& step() const noexcept { return step_; }
+  /// What limit i pushes with: what would be gained, by the slope of J that the wish is made of, per unit of its room.
+  double multiplier(std::size_t i) const noexcept { return planes_[i].multiplier; }
 
  private:
   struct Plane {
