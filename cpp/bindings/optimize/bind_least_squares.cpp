@@ -1,10 +1,13 @@
 // Binds include/mgdd/optimize: least squares for Python callables, its parameters, options and report.
+#include <numeric>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/math/autocorrelation.hpp"
+#include "mgdd/optimize/least_squares/block_sandwich.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/multi_start.hpp"
 #include "record_binding.hpp"
@@ -55,7 +58,7 @@ Evaluation call(const py::function& fun, const Eigen::VectorXd& x) {
 }
 
 FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std::vector<Parameter> parameters,
-                        const LeastSquaresOptions& options) {
+                        const LeastSquaresOptions& options, const std::vector<Eigen::Index>& records) {
   options.validate();
   optimize::validate(parameters);
   optimize::validate_start(parameters, x0);
@@ -63,6 +66,11 @@ FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std:
   Evaluation first = call(fun, x0);
   bool have_first = true;
   const auto n_residuals = first.usable ? first.residual.shape(0) : x0.size();
+  const auto rows_said = std::accumulate(records.begin(), records.end(), Eigen::Index{0});
+  if (!records.empty() && first.usable && rows_said != n_residuals) {
+    throw about("records", ShapeError("records are " + std::to_string(rows_said) + " residuals: fun returns " +
+                                      std::to_string(n_residuals)));
+  }
   const auto model = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     const py::gil_scoped_acquire gil;
     const Evaluation evaluation = have_first ? std::move(first) : call(fun, x);
@@ -77,7 +85,15 @@ FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std:
     }
     return true;
   };
-  return without_gil([&] { return LeastSquares(std::move(parameters), n_residuals, options).solve(model, x0); });
+  LeastSquares search(std::move(parameters), n_residuals, options);
+  FitReport report = without_gil([&] { return search.solve(model, x0); });
+  if (!records.empty() && std::isfinite(report.cost)) {
+    std::vector<optimize::ResidualRecord> rows;
+    for (const Eigen::Index count : records)
+      rows.push_back({rows.empty() ? 0 : rows.back().first + rows.back().rows, count});
+    optimize::block_sandwich(report, search.jacobian(), rows);
+  }
+  return report;
 }
 
 py::dict history(const FitReport& report) {
@@ -169,8 +185,11 @@ void bind_least_squares(py::module_& m) {
   bind_parameter(m);
   bind_options(m);
   bind_report(m);
-  m.def("least_squares", &least_squares, py::arg("fun"), py::arg("x0"), py::kw_only(), py::arg("parameters"),
-        py::arg("options"), "Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.");
+  m.def(
+      "least_squares", &least_squares, py::arg("fun"), py::arg("x0"), py::kw_only(), py::arg("parameters"),
+      py::arg("options"), py::arg("records") = std::vector<Eigen::Index>{},
+      "Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point. With the rows of each "
+      "record, errors count blocks of what is correlated in time.");
   m.def("latin_hypercube", &optimize::spread_starts, py::arg("parameters"), py::arg("n"), py::arg("seed"),
         py::call_guard<py::gil_scoped_release>(), "Points between the bounds, one per cell of every axis.");
 }

@@ -1562,7 +1562,7 @@ def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.S
     """
     Points between the bounds, one per cell of every axis.
     """
-def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
+def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions, records: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = []) -> FitReport:
     """
-    Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.
+    Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point. With the rows of each record, errors count blocks of what is correlated in time.
     """

@@ -81,6 +81,8 @@ def _track(args: argparse.Namespace) -> None:
     warn(*doubts)
     with named_options(airflow_torque_nm="airflow"):
         run = track(controller, reference, throttle=plant, **_AIR.given(args), **how)
+    swings = str(run.attrs.get("findings", "")).splitlines()
+    warn(*swings)
     p50, p999 = step_times_us(controller, run)
     payload = {
         "controller": args.controller,
@@ -92,7 +94,7 @@ def _track(args: argparse.Namespace) -> None:
         "band_deg": reference.band_deg,
         "step_us_p50": p50,
         "step_us_p999": p999,
-        "warnings": list(doubts),
+        "warnings": [*doubts, *swings],
     }
     traces = run.drop_vars([name for name in FIGURES if name in run])
     emit(args, payload, traces=traces, figure=partial(drawn, throttle_run, run, size=(7.0, 5.4)))

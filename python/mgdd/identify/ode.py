@@ -10,18 +10,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mgdd import _core
-from mgdd.errors import ParameterError, ShapeError
-from mgdd.identify.ode_model import Derivative, OdeModel, Output, output_or_first_state, run_in_lockstep
+from mgdd._arguments import as_floats, shown
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.identify.ode_model import (
+    Derivative,
+    Drive,
+    Interpolation,
+    OdeModel,
+    Output,
+    output_or_first_state,
+    run_in_lockstep,
+)
 from mgdd.optimize import least_squares
 from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of, spread_starts
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.results import Fit
 from mgdd.results.fit_report import FitReport
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.model import columns_of
+from mgdd.signals.model import columns_of, table_of
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
+_DELAY = "input_delay_s"
 
 
 def fit_ode(
@@ -37,12 +47,14 @@ def fit_ode(
     free_state: Sequence[int] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     log_scaled: Collection[str] = (),
+    interpolation: Interpolation = "hold",
+    input_delay_s: float | tuple[float, float] = 0.0,
     substeps: int = 1,
     skip: int = 0,
-    sigma: float = 1.0,
+    sigma: ArrayLike | Sequence[ArrayLike] = 1.0,
     options: FitOptions | None = None,
 ) -> Fit:
-    """Fit parameters and start of the user's own ODE to a record: output error of the free run.
+    """Fit parameters and start of the user's own ODE to records: output error of the free run.
 
     The function is evaluated on stacked perturbed parameters, so that a simulation and all its central differences
     run in lockstep: write it with ``x[0]``, ``p[1]`` and NumPy functions, and it takes columns unchanged. For long
@@ -51,13 +63,14 @@ def fit_ode(
     Parameters
     ----------
     derivative : callable
-        ``derivative(t, x, u, p)`` [state unit per s]: time [s], state (n_states, m), input (n_inputs,), parameters
-        (n_parameters, m) in the order of `parameters`; returns (n_states, m) or a sequence of n_states rows.
-    record : xarray.Dataset, DataFrame or mapping of columns
-        ``time_s`` [s], evenly spaced, the inputs, each held to the next sample, and the measured output.
+        ``derivative(t, x, u, p)`` [state unit per s]: time [s], state (n_states, m), input (n_inputs,), or (n_inputs,
+        m) while a delay is searched, parameters (n_parameters, m) in the order of `parameters`; returns (n_states, m)
+        or a sequence of n_states rows.
+    record : xarray.Dataset, DataFrame or mapping of columns, or a list of them
+        ``time_s`` [s], evenly spaced, the inputs, and the measured output; a sample of that which is NaN is missing.
     parameters : mapping of str to float
         Start values.
-    initial_state : array_like, shape (n_states,)
+    initial_state : array_like, shape (n_states,) or (n_records, n_states)
         State at the first sample; for the free ones where the search starts.
     input_names : sequence of str
         Columns that make up the input, in order.
@@ -68,16 +81,23 @@ def fit_ode(
     free : collection of str, optional
         Parameters that are estimated; all without.
     free_state : sequence of int
-        States whose value at the first sample is estimated; reported as ``state_0``, ...
+        States whose value at the first sample is estimated; reported as ``state_0``, ..., of several records as
+        ``state_0_of_1``, ...
     bounds : mapping of str to (float, float), optional
-        Per parameter, also for ``state_0``.
+        Per parameter, also for ``state_0``, which holds for all records.
     log_scaled : collection of str
         Parameters searched as logarithms; they need a positive lower bound.
+    interpolation : {"hold", "linear", "cubic"}
+        Inputs between the samples: each held to the next one, as a converter does; of signals that were measured on the
+        way a line or a cubic spline comes nearer.
+    input_delay_s : float or (float, float)
+        By which the inputs act later than they are sampled, >= 0 [s]; between two bounds it is estimated, and reported
+        as ``input_delay_s``. It need not be whole samples.
     substeps : int
         Equal Runge-Kutta steps per sample.
     skip : int
         First samples without a residual.
-    sigma : float
+    sigma : float, array_like with one per sample, or a list of these with one per record
         Noise level in the unit of the output; the residual is divided by it.
     options : FitOptions, optional
         1 start, 100 trial steps and a tolerance of 1e-9 by default; more starts come from a Latin
@@ -86,7 +106,8 @@ def fit_ode(
     Returns
     -------
     mgdd.results.Fit
-        Report, model, and the reports of all starts.
+        Report, model with the start of the first record and its free run, and the reports of all starts. Standard
+        errors count blocks of a residual that is correlated in time (Kuensch 1989).
 
     Raises
     ------
@@ -105,7 +126,8 @@ def fit_ode(
 
     References
     ----------
-    Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty.
+    Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty; Kuensch (1989), The
+    jackknife and the bootstrap for general stationary observations.
 
     Examples
     --------
@@ -114,56 +136,59 @@ def fit_ode(
     >>> time = np.linspace(0.0, 10.0, 201)
     >>> def lag(t, x, u, p):
     ...     return (p[0] * u[0] - x) / p[1]
-    >>> y = 2.0 * (1.0 - np.exp(-time / 0.5))
-    >>> record = {"time_s": time, "u": np.ones(201), "y": y}
-    >>> fit = fit_ode(lag, record, parameters={"gain": 1.0, "time_s": 1.0}, initial_state=[0.0])
-    >>> fit.report.values.round(3).tolist()
-    [2.0, 0.5]
+    >>> y = np.where(time > 0.3, 2.0 * (1.0 - np.exp(-(time - 0.3) / 0.5)), 0.0)
+    >>> record = {"time_s": time, "u": (time > -1e-9) * 1.0, "y": y}
+    >>> record["u"][0] = 0.0
+    >>> start = {"gain": 1.0, "time_constant_s": 1.0}
+    >>> fit = fit_ode(lag, record, parameters=start, initial_state=[0.0], input_delay_s=(0.0, 1.0))
+    >>> fit.report.values.round(2).tolist()
+    [2.0, 0.5, 0.25]
     """
     chosen_options = fit_options(options, n_starts=1, seed=0, max_iterations=100, tolerance=1e-9)
     n_starts = chosen_options.n_starts
-    time, *columns, measured = columns_of(record, ("time_s", *input_names, output_name))
-    even_step(time)
-    inputs = np.column_stack(columns)
-    state = np.array(initial_state, dtype=np.float64)
-    if state.ndim != 1 or not np.isfinite(state).all():
-        raise ShapeError("initial_state: must be a vector of finite numbers, one per state")
-    ParameterError.unless(0 <= skip < time.size, "skip", skip, f"within [0, {time.size - 1}]")
-    ParameterError.unless(np.isfinite(sigma) and sigma > 0.0, "sigma", sigma, "> 0")
     ParameterError.unless(substeps >= 1, "substeps", substeps, ">= 1")
-    names = list(parameters)
-    chosen = names if free is None else [name for name in names if name in set(free)]
+    names = ("time_s", *input_names, output_name)
+    given = list(record) if _several(record) else [record]
+    sigmas = _per_record(sigma, len(given))
+    runs = [
+        _Run.of(table, names, Drive(*_inputs_of(table, names), substeps, interpolation), skip, own)
+        for table, own in zip(given, sigmas, strict=True)
+    ]
+    states = _states_of(initial_state, len(runs))
+    delay, delay_bounds = _delay_of(input_delay_s)
+    all_names = list(parameters)
+    chosen = all_names if free is None else [name for name in all_names if name in set(free)]
     free_states = [f"state_{i}" for i in free_state]
-    unknowns = [*chosen, *free_states]
+    starts_of = {f"{own}_of_{k}": own for k in range(len(runs)) for own in free_states}
+    if len(runs) == 1:
+        starts_of = {own: own for own in free_states}
+    unknowns = [*chosen, *starts_of, *([_DELAY] if delay_bounds else [])]
     for i, name in enumerate(unknowns):
         if name in unknowns[:i]:
             raise ParameterError(f"parameter name {name!r} appears twice: names must be unique")
-    for given in (free or (), bounds or (), log_scaled):
-        for name in given:
-            if name not in names and name not in free_states:
+    for mentioned in (free or (), bounds or (), log_scaled):
+        for name in mentioned:
+            if name not in all_names and name not in free_states and name not in unknowns:
                 raise ParameterError(
-                    f"{name!r}: no parameter of this model; it has {', '.join([*names, *free_states])}"
+                    f"{name!r}: no parameter of this model; it has {', '.join([*all_names, *free_states])}"
                 )
-    if any(not 0 <= i < state.size for i in free_state):
-        raise ParameterError.of("free_state", list(free_state), f"indices of the {state.size} states")
-    p0 = np.array([float(parameters[name]) for name in names])
-    where = [names.index(name) for name in chosen]
-    limits = [(bounds or {}).get(name, (-np.inf, np.inf)) for name in unknowns]
-    lower = np.array([low for low, _ in limits], dtype=np.float64)
-    upper = np.array([high for _, high in limits], dtype=np.float64)
-    logs = [name in set(log_scaled) for name in unknowns]
+    if any(not 0 <= i < states.shape[1] for i in free_state):
+        raise ParameterError.of("free_state", list(free_state), f"indices of the {states.shape[1]} states")
+    p0 = np.array([float(parameters[name]) for name in all_names])
+    where = [all_names.index(name) for name in chosen]
+    known = {_DELAY: delay_bounds or (0.0, 0.0), **(bounds or {})}
+    limits = [known.get(name, known.get(starts_of.get(name, name), (-np.inf, np.inf))) for name in unknowns]
+    lower, upper = (np.array([ends[side] for ends in limits], dtype=np.float64) for side in (0, 1))
+    logs = [not {name, starts_of.get(name, name)}.isdisjoint(log_scaled) for name in unknowns]
     read = output_or_first_state(output)
     search = _Search(
         derivative=derivative,
         output=read,
-        time=time,
-        inputs=inputs,
-        measured=measured,
-        substeps=substeps,
-        skip=skip,
-        sigma=sigma,
+        runs=runs,
         p0=p0.copy(),
-        state=state.copy(),
+        states=states.copy(),
+        delay=delay,
+        delay_free=delay_bounds is not None,
         where=where,
         free_state=tuple(free_state),
         names=tuple(unknowns),
@@ -172,36 +197,109 @@ def fit_ode(
         logs=logs,
         options=chosen_options,
     )
-    first = dict(zip(unknowns, [*p0[where].tolist(), *state[list(free_state)].tolist()], strict=True))
+    started = [*p0[where].tolist(), *states[:, list(free_state)].ravel().tolist(), *([delay] if delay_bounds else [])]
     box = [
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=log)
         for name, low, high, log in zip(unknowns, lower.tolist(), upper.tolist(), logs, strict=True)
     ]
-    starts = spread_starts(first, box, n_starts, chosen_options.seed)
+    starts = spread_starts(dict(zip(unknowns, started, strict=True)), box, n_starts, chosen_options.seed)
     reports: list[FitReport] = []
     stop = keep_finished(search.one, starts, reports)
     if reports[0].status == "evaluation_failed" and n_starts == 1:
         raise ParameterError("the model gives no finite simulation at the start values: change them or raise substeps")
     best = min(reports, key=lambda report: report.cost if np.isfinite(report.cost) else np.inf)
-    p0[where] = best.values[: len(chosen)]
-    state[list(free_state)] = best.values[len(chosen) :]
+    p, start, found_delay = (array[..., 0] for array in search.columns(best.values[:, None]))
     model = OdeModel(
         derivative=derivative,
         output=read,
-        parameters=dict(zip(names, p0.tolist(), strict=True)),
-        initial_state=tuple(state.tolist()),
+        parameters=dict(zip(all_names, p.tolist(), strict=True)),
+        initial_state=tuple(start[0].tolist()),
         substeps=substeps,
         input_names=tuple(input_names),
         output_name=output_name,
+        interpolation=interpolation,
+        input_delay_s=float(found_delay),
     )
     errors = [report.rmse if np.isfinite(report.rmse) else np.inf for report in reports]
     run, quality = None, None
     if np.isfinite(best.rmse):
-        simulated = model.simulate(record)[output_name].to_numpy()
-        run = fit_run(time, measured, simulated, model._label(output_name))
-        quality = quality_of(run.isel(time_s=slice(skip, None)))
+        first = runs[0]
+        simulated = model.simulate(given[0])[output_name].to_numpy()
+        run = fit_run(first.drive.time_s, first.measured, simulated, model._label(output_name))
+        quality = quality_of(run.isel(time_s=first.kept))
     fit = fit_of(best, model, run, errors, train=quality, start_reports=tuple(reports))
     return hand_over(fit, stop)
+
+
+def _several(record: Any) -> bool:
+    """Whether these are records, and not the columns of one."""
+    tables = isinstance(record, list | tuple) and len(record) > 0
+    return tables and all(isinstance(each, Mapping) or hasattr(each, "columns") for each in record)
+
+
+def _per_record(sigma: Any, records: int) -> list[Any]:
+    if records == 1 or np.ndim(sigma) == 0:
+        return [sigma] * records
+    if len(sigma) != records:
+        raise ShapeError.of("sigma", sigma, f"one number, or one entry per record, {records}")
+    return list(sigma)
+
+
+def _states_of(given: ArrayLike, records: int) -> NDArray[np.float64]:
+    states = np.array(given, dtype=np.float64)
+    if states.ndim == 1:
+        states = np.repeat(states[None], records, axis=0)
+    if states.ndim != 2 or states.shape[0] != records or not np.isfinite(states).all():
+        rows = "a vector" if records == 1 else f"a vector, or {records} of them,"
+        raise ShapeError(f"initial_state: must be {rows} of finite numbers, one per state")
+    return states
+
+
+def _delay_of(given: float | tuple[float, float]) -> tuple[float, tuple[float, float] | None]:
+    ends = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    if ends.shape not in ((1,), (2,)) or not np.isfinite(ends).all() or ends[0] < 0.0 or ends[-1] < ends[0]:
+        raise ParameterError.of(_DELAY, shown(given), "a delay >= 0 [s], or its two bounds")
+    if ends.size == 1 or ends[0] == ends[1]:
+        return float(ends[0]), None
+    return float(ends.mean()), (float(ends[0]), float(ends[1]))
+
+
+def _inputs_of(table: Any, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    time, *columns = columns_of(table_of(table, names, what="record"), names[:-1], what="record")
+    even_step(time)
+    return time, np.column_stack(columns)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One record: what drives it, its output, and the samples that count, with their noise level."""
+
+    drive: Drive
+    measured: NDArray[np.float64]
+    kept: NDArray[np.int_]
+    sigma: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, table: Any, names: Sequence[str], drive: Drive, skip: int, sigma: Any) -> _Run:
+        columns, name, n = table_of(table, names, what="record"), names[-1], drive.time_s.size
+        if name not in columns:
+            columns_of(columns, [name], what="record")  # says what is there
+        measured = as_floats(columns[name])
+        if measured.shape != (n,):
+            raise ShapeError(f"{', '.join(names)} have shapes {[(n,), measured.shape]}: must be columns of one length")
+        if np.isinf(measured).any():
+            raise DataError(f"{name}: sample {int(np.argmax(np.isinf(measured)))} is not a finite number")
+        ParameterError.unless(0 <= skip < n, "skip", skip, f"within [0, {n - 1}]")
+        levels = np.asarray(sigma, dtype=np.float64)
+        if levels.ndim > 0 and levels.shape != (n,):
+            raise ShapeError.of("sigma", levels.shape, f"one number, or one per sample, {n}")
+        levels = np.broadcast_to(levels, (n,))
+        kept = np.flatnonzero(np.isfinite(measured) & (np.arange(n) >= skip))
+        if kept.size == 0:
+            raise DataError(f"{name}: every sample is missing (NaN) or skipped")
+        wrong = ~(np.isfinite(levels[kept]) & (levels[kept] > 0.0))
+        ParameterError.unless(not wrong.any(), "sigma", float(levels[kept][int(np.argmax(wrong))]), "> 0")
+        return cls(drive, measured, kept, levels[kept])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,14 +308,11 @@ class _Search:
 
     derivative: Derivative
     output: Output
-    time: NDArray[np.float64]
-    inputs: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    substeps: int
-    skip: int
-    sigma: float
+    runs: Sequence[_Run]
     p0: NDArray[np.float64]
-    state: NDArray[np.float64]
+    states: NDArray[np.float64]
+    delay: float
+    delay_free: bool
     where: Sequence[int]
     free_state: tuple[int, ...]
     names: tuple[str, ...]
@@ -233,30 +328,37 @@ class _Search:
             names=self.names,
             bounds=(self.lower, self.upper),
             log_scaled=self.logs,
-            data=self.measured[self.skip :] / self.sigma,
+            data=np.concatenate([run.measured[run.kept] / run.sigma for run in self.runs]),
+            records=[run.kept.size for run in self.runs],
             max_iterations=self.options.max_iterations,
             cost_tolerance=self.options.tolerance,
         )
 
     def residual(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        p, s, widths = self.stack(x)
-        with np.errstate(all="ignore"):
-            simulated = run_in_lockstep(self.derivative, self.output, self.time, self.inputs, s, p, self.substeps)
-        simulated = simulated[self.skip :]
-        if not np.isfinite(simulated).all():
-            return None
         n = x.size
-        difference = (simulated[:, 1 : n + 1] - simulated[:, n + 1 :]) / widths
-        return (simulated[:, 0] - self.measured[self.skip :]) / self.sigma, difference / self.sigma
-
-    def stack(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        n, m = x.size, len(self.where)
         steps = _STEP * np.maximum(np.abs(x), np.where(self.logs, 0.0, 1e-3))
         columns = np.repeat(x[:, None], 2 * n + 1, axis=1)
         columns[np.arange(n), 1 + np.arange(n)] += steps
         columns[np.arange(n), 1 + n + np.arange(n)] -= steps
-        p = np.repeat(self.p0[:, None], 2 * n + 1, axis=1)
-        p[self.where] = columns[:m]
-        s = np.repeat(self.state[:, None], 2 * n + 1, axis=1)
-        s[list(self.free_state)] = columns[m:]
-        return p, s, columns[np.arange(n), 1 + np.arange(n)] - columns[np.arange(n), 1 + n + np.arange(n)]
+        widths = columns[np.arange(n), 1 + np.arange(n)] - columns[np.arange(n), 1 + n + np.arange(n)]
+        p, states, delay = self.columns(columns)
+        values, slopes = [], []
+        for run, state in zip(self.runs, states, strict=True):
+            with np.errstate(all="ignore"):
+                simulated = run_in_lockstep(self.derivative, self.output, run.drive, state, p, delay)[run.kept]
+            if not np.isfinite(simulated).all():
+                return None
+            values.append((simulated[:, 0] - run.measured[run.kept]) / run.sigma)
+            slopes.append((simulated[:, 1 : n + 1] - simulated[:, n + 1 :]) / widths / run.sigma[:, None])
+        return np.concatenate(values), np.concatenate(slopes)
+
+    def columns(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return parameters, shape (n, m), states, (records, n_states, m), and delay, (m,), of columns of unknowns."""
+        m, first = x.shape[1], len(self.where)
+        p = np.repeat(self.p0[:, None], m, axis=1)
+        p[self.where] = x[:first]
+        states = np.repeat(self.states[:, :, None], m, axis=2)
+        for k in range(len(self.runs)):
+            own = first + k * len(self.free_state)
+            states[k, list(self.free_state)] = x[own : own + len(self.free_state)]
+        return p, states, x[-1] if self.delay_free else np.full(m, self.delay)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,8 @@ from mgdd.signals.model import RunInputs, SampledModel
 Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 
+Interpolation = Literal["hold", "linear", "cubic"]
+
 _FUNCTIONS = ("derivative", "output")
 _STATE = "unit of the state"
 
@@ -28,7 +30,7 @@ _STATE = "unit of the state"
 @described
 @dataclass(frozen=True, kw_only=True)
 class OdeModel(SampledModel):
-    """An ordinary differential equation with its parameters, on fixed Runge-Kutta steps with the input held.
+    """An ordinary differential equation with its parameters, on fixed Runge-Kutta steps.
 
     Parameters
     ----------
@@ -46,6 +48,10 @@ class OdeModel(SampledModel):
         Columns that make up the input, in order.
     output_name : str
         Name of the output.
+    interpolation : {"hold", "linear", "cubic"}
+        Inputs between the samples, as in `fit_ode`.
+    input_delay_s : float
+        By which the inputs act later than they are sampled [s]; before that the first sample acts.
 
     Examples
     --------
@@ -69,6 +75,8 @@ class OdeModel(SampledModel):
     substeps: int = 1
     input_names: tuple[str, ...] = ("u",)
     output_name: str = "y"
+    interpolation: Interpolation = "hold"
+    input_delay_s: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
@@ -80,9 +88,8 @@ class OdeModel(SampledModel):
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
         p = np.array(list(self.parameters.values()))[:, None]
         start = np.array(run.state, dtype=np.float64)[:, None]
-        return run_in_lockstep(
-            self.derivative, self.output, run.time_s, np.column_stack(run.columns), start, p, self.substeps
-        )[:, 0]
+        drive = Drive(run.time_s, np.column_stack(run.columns), self.substeps, self.interpolation)
+        return run_in_lockstep(self.derivative, self.output, drive, start, p, self.input_delay_s)[:, 0]
 
     def _label(self, name: str) -> Label:
         return VARIABLES.get(name, Label(f"unit of {name}", name))
@@ -94,6 +101,8 @@ class OdeModel(SampledModel):
             "substeps": Entry(value=self.substeps),
             "input_names": Entry(value=list(self.input_names)),
             "output_name": Entry(value=self.output_name),
+            "interpolation": Entry(value=self.interpolation),
+            "input_delay_s": Entry(value=self.input_delay_s, unit="s"),
         }
         functions = {name: _name_of(getattr(self, name)) for name in _FUNCTIONS}
         tables = {"parameters": entries(self.parameters), "settings": settings, "functions": entries(functions)}
@@ -141,6 +150,8 @@ class OdeModel(SampledModel):
             "substeps": Wanted(form="integer"),
             "input_names": Wanted(form="texts"),
             "output_name": Wanted(form="text"),
+            "interpolation": Wanted(form="text"),
+            "input_delay_s": Wanted("s"),
         }
         settings = file.values("settings", expected)
         values = file.values("parameters", {name: Wanted(unit_of(name)) for name in file.tables["parameters"]})
@@ -152,6 +163,8 @@ class OdeModel(SampledModel):
             substeps=settings["substeps"],
             input_names=tuple(settings["input_names"]),
             output_name=settings["output_name"],
+            interpolation=settings["interpolation"],
+            input_delay_s=settings["input_delay_s"],
         )
 
 
@@ -170,18 +183,77 @@ def _first_state(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> NDArray[A
     return first
 
 
+@dataclass(frozen=True)
+class Drive:
+    """Sampled inputs, shape (samples, inputs), and what lies between the samples."""
+
+    time_s: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    substeps: int
+    interpolation: Interpolation
+
+    def __post_init__(self) -> None:
+        known = ("hold", "linear", "cubic")
+        ParameterError.unless(self.interpolation in known, "interpolation", self.interpolation, f"one of {known}")
+        if self.interpolation == "cubic" and self.time_s.size < 4:
+            raise ShapeError(f"interpolation = 'cubic': needs 4 samples, the record has {self.time_s.size}")
+
+    @property
+    def step_s(self) -> float:
+        """Length of a Runge-Kutta step."""
+        return even_step(self.time_s) / self.substeps
+
+    def acting(self, delay_s: float | NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the inputs at the samples, and at the begin, the middle and the end of every step, as second axis.
+
+        A delay for each of m columns adds an axis of length m. Of inputs that are held a step sees their mean over it,
+        so that what a delay does is continuous.
+        """
+        if np.ndim(delay_s) > 0:
+            several, which = np.unique(delay_s, return_inverse=True)
+            each = [self.acting(float(one)) for one in several]
+            if len(each) > 1:
+                samples, steps = (np.stack(parts, axis=-1)[..., which] for parts in zip(*each, strict=True))
+                return samples, steps
+            return each[0]
+        n = (self.time_s.size - 1) * self.substeps
+        ends = self.time_s[0] + self.step_s * np.arange(n + 1) - delay_s
+        if self.interpolation != "hold":
+            middles = 0.5 * (ends[:-1] + ends[1:])
+            steps = np.stack([self._between(at) for at in (ends[:-1], middles, ends[1:])], axis=1)
+            return self._between(self.time_s - delay_s), steps
+        if delay_s == 0.0:
+            held = np.repeat(self.inputs[:-1], self.substeps, axis=0)
+            return self.inputs, np.repeat(held[:, None], 3, axis=1)
+        times = np.concatenate([[self.time_s[0] - delay_s - 1.0], self.time_s, [self.time_s[-1] + 1.0]])
+        areas = np.vstack([self.inputs[:1], self.inputs]) * np.diff(times)[:, None]
+        whole = np.vstack([np.zeros_like(areas[:1]), np.cumsum(areas, axis=0)])
+        until = np.column_stack([np.interp(ends, times, column) for column in whole.T])
+        mean = np.diff(until, axis=0) / self.step_s
+        at = np.searchsorted(self.time_s, self.time_s - delay_s, side="right") - 1
+        return self.inputs[np.maximum(at, 0)], np.repeat(mean[:, None], 3, axis=1)
+
+    def _between(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        from scipy.interpolate import make_interp_spline
+
+        within = np.clip(at, self.time_s[0], self.time_s[-1])
+        spline = make_interp_spline(self.time_s, self.inputs, k=1 if self.interpolation == "linear" else 3)
+        return np.asarray(spline(within), dtype=np.float64)
+
+
 def run_in_lockstep(
     derivative: Derivative,
     output: Output,
-    time: NDArray[np.float64],
-    inputs: NDArray[np.float64],
+    drive: Drive,
     state: NDArray[np.float64],
     p: NDArray[np.float64],
-    substeps: int,
+    delay_s: float | NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Simulate columns of states and parameters side by side, shape (samples, columns) of the output."""
     x = state.copy()
-    h = even_step(time) / substeps
+    h = drive.step_s
+    time = drive.time_s
+    samples, steps = drive.acting(delay_s)
     y = np.empty((time.size, p.shape[1]))
 
     def slope(t: float, at: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -194,15 +266,15 @@ def run_in_lockstep(
         return stacked
 
     for k in range(time.size):
-        u = inputs[k]
-        y[k] = output(x, u, p)
+        y[k] = output(x, samples[k], p)
         if k + 1 == time.size:
             break
-        for part in range(substeps):
+        for part in range(drive.substeps):
             t = float(time[k] + part * h)
-            k1 = slope(t, x, u)
-            k2 = slope(t + 0.5 * h, x + 0.5 * h * k1, u)
-            k3 = slope(t + 0.5 * h, x + 0.5 * h * k2, u)
-            k4 = slope(t + h, x + h * k3, u)
+            begin, middle, end = steps[k * drive.substeps + part]
+            k1 = slope(t, x, begin)
+            k2 = slope(t + 0.5 * h, x + 0.5 * h * k1, middle)
+            k3 = slope(t + 0.5 * h, x + 0.5 * h * k2, middle)
+            k4 = slope(t + h, x + h * k3, end)
             x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
     return y

@@ -13,7 +13,17 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop.plates import PlateLike, plate_of
 from mgdd.loop.reference import Reference
-from mgdd.loop.track import FIGURES, AngleController, column_of, core_of, plant_of, reference_of, sensors_of, track
+from mgdd.loop.track import (
+    FIGURES,
+    SWINGS_DEG,
+    AngleController,
+    column_of,
+    core_of,
+    plant_of,
+    reference_of,
+    sensors_of,
+    track,
+)
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import threads_of
 from mgdd.results.labels import labelled_dataset
@@ -60,7 +70,8 @@ def track_many(
     Returns
     -------
     xarray.Dataset
-        The scalars of `track` over ``throttle``, ``controller`` and ``reference``.
+        The scalars of `track` over ``throttle``, ``controller`` and ``reference``. ``attrs["findings"]`` where plates
+        swing.
 
     Raises
     ------
@@ -152,5 +163,8 @@ def track_many(
         variables[name] = (dims, values if stop is None else np.where(finished, values, np.nan))
     if stop is not None:
         variables["finished"] = (dims, finished, "-", "whether the run came to its end")
-    attrs = {"delay_samples": delay_samples, "noise_deg": noise_deg, "seed": first_seed}
+    attrs: dict[str, Any] = {"delay_samples": delay_samples, "noise_deg": noise_deg, "seed": first_seed}
+    swinging = int((np.asarray(figures["limit_cycle_deg"]) > SWINGS_DEG).sum())
+    if swinging:
+        attrs["findings"] = f"{swinging} of {finished.size} runs swing by more than {SWINGS_DEG:g} deg: limit_cycle_deg"
     return hand_over(labelled_dataset(variables, attrs=attrs), stop)

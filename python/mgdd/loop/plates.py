@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -105,6 +108,42 @@ class _ModelPlate:
 
     def step(self, duty: float, /) -> None:
         self._state = self._stepper.advance(self._state, duty)
+
+
+class OwnPlate:
+    """A plant that is not a `Throttle`, with white noise on its angle."""
+
+    _still: Mapping[str, float] = MappingProxyType({"supply_v": math.nan})
+
+    def __init__(
+        self,
+        plate: Plate,
+        sample_s: float,
+        first_deg: float,
+        start_deg: float | None,
+        noise_deg: float,
+        seed: int,
+    ) -> None:
+        if start_deg is not None and plate.model is None:
+            raise ParameterError.of("start_deg", start_deg, "left out: a plant of your own starts where it is")
+        self._plant: PlatePlant = plate.moving(sample_s, first_deg if start_deg is None else start_deg)
+        self.start_deg = self._angle()
+        self._noise, self._rng = noise_deg, np.random.default_rng(seed)
+
+    def _angle(self) -> float:
+        given = self._plant.output
+        try:
+            angle = float(given() if callable(given) else given)
+        except TypeError:
+            raise ParameterError.of("output of the plant", given, "one number, the angle now [deg]") from None
+        ParameterError.unless(math.isfinite(angle), "output of the plant", angle, "a finite angle [deg]")
+        return angle
+
+    def step(self, *, duty: float, **_none: float) -> dict[str, float]:
+        """Let a duty act for one sample, and read the angle."""
+        self._plant.step(float(np.clip(duty, -1.0, 1.0)))
+        angle = self._angle()
+        return {"angle_deg": angle, "sensed_angle_deg": angle + self._noise * float(self._rng.standard_normal())}
 
 
 PlateLike = ThrottleLike | Fit | SampledModel | PlatePlant | Plate

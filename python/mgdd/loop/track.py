@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -12,9 +9,10 @@ import numpy as np
 from mgdd import _core
 from mgdd._arguments import require_plain
 from mgdd.errors import ParameterError
-from mgdd.loop.plates import Plate, PlateLike, PlatePlant, plate_of
+from mgdd.loop.plates import OwnPlate, PlateLike, plate_of
 from mgdd.loop.reference import Reference
 from mgdd.loop.virtual_throttle import VirtualThrottle
+from mgdd.results.finding import Finding
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of, is_timed
@@ -35,6 +33,9 @@ FIGURES = (
     "limit_cycle_deg",
     "largest_error_deg",
 )
+SWINGS_DEG = 0.5  # peak to peak at rest, where only that is known of a run
+# Crossings that follow one another as quickly as those of a loop that is too slow; settling makes two or three.
+_BESIDE_DEG, _QUICK_S, _CROSSINGS = 0.25, 0.15, 4
 _CORE = (_core.control.GuidedPredictive, _core.control.Pid, _core.control.SlidingMode, _core.loop.Mgdd1)
 
 
@@ -109,7 +110,8 @@ def track(
         Scalars, judged from ``reference.from_s`` on:
         ``settling_ms`` (until the error stays in the band; NaN: never), ``mse_deg2``, ``static_error_deg`` (mean size
         over the last 0.1 s), ``overshoot_deg``, ``total_variation`` of the duty [-], ``limit_cycle_deg`` (peak to peak
-        over the last 0.3 s of a reference that stands still) and ``largest_error_deg``.
+        over the last 0.3 s of a reference that stands still) and ``largest_error_deg``. ``attrs["findings"]`` where
+        the plate swings.
 
     Raises
     ------
@@ -138,7 +140,10 @@ def track(
         )  # fmt: skip
     ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
     if not isinstance(plate.plant, Throttle):
-        own = _OwnPlate(plate, target, start_deg, noise_deg, sensors, seed)
+        if sensors is not None:
+            raise ParameterError.of("sensors", sensors, "left out where the plant is not a throttle: give noise_deg")
+        sensors_of(noise_deg)  # refuses it alike
+        own = OwnPlate(plate, target.sample_s, float(target.angle_deg[0]), start_deg, noise_deg, seed)
         run = _run_in_python(controller, own, target.angle_deg, delay_samples, airflow, supply)
     else:
         plant = plant_of(plate.plant, target, start_deg, sensors or sensors_of(noise_deg), seed)
@@ -175,7 +180,34 @@ def track(
         if len(column):
             variables[name] = ("time_s", column)
     attributes = {"reference": target.name, "band_deg": target.band_deg, "delay_samples": delay_samples, "seed": seed}
+    swing = swinging(target.angle_deg, run["angle_deg"], target.sample_s)
+    if swing is not None:
+        attributes["findings"] = str(swing)
     return labelled_dataset(variables, attrs=attributes)
+
+
+def swinging(reference_deg: NDArray[np.float64], angle_deg: NDArray[np.float64], sample_s: float) -> Finding | None:
+    """Return what is to be said of a plate that swings about a reference which stands still, None where it does not."""
+    error = angle_deg - reference_deg
+    stands = np.cumsum(np.diff(reference_deg, prepend=reference_deg[0]) != 0.0)
+    beside = np.flatnonzero(np.abs(error) > _BESIDE_DEG)
+    crossed = (error[beside[1:]] > 0.0) != (error[beside[:-1]] > 0.0)
+    crossings = beside[1:][crossed & (stands[beside[1:]] == stands[beside[:-1]])]
+    quick = (np.diff(crossings) * sample_s <= _QUICK_S) & (np.diff(stands[crossings]) == 0)
+    begins = np.flatnonzero(np.concatenate([[True], ~quick])) if crossings.size else np.empty(0, int)
+    lengths = np.diff(np.append(begins, crossings.size))
+    if not (lengths >= _CROSSINGS).any():
+        return None
+    longest = int(np.argmax(lengths))
+    own = crossings[begins[longest] : begins[longest] + lengths[longest]]
+    spread = float(np.ptp(error[own[0] : own[-1] + 1]))
+    return Finding(
+        "oscillation", ("angle_deg",),
+        f"the plate swings by {spread:.2g} deg about a reference that stands still: it crosses it {own.size} times "
+        f"from {own[0] * sample_s:.3g} s on",
+        "make the controller for the delay of the loop (tuned_controller('guided', ..., delay_samples=...), or numbers "
+        "of tune_controller(..., delay_samples=...) for one that takes none), or lower its gains",
+    )  # fmt: skip
 
 
 def step_times_us(controller: AngleController, run: xr.Dataset) -> tuple[float, float]:
@@ -220,48 +252,9 @@ def column_of(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]
     return np.full(n, float(column)) if column.ndim == 0 else column
 
 
-class _OwnPlate:
-    """A plant that is not a `Throttle`, with white noise on its angle."""
-
-    _still: Mapping[str, float] = MappingProxyType({"supply_v": math.nan})
-
-    def __init__(
-        self,
-        plate: Plate,
-        reference: Reference,
-        start_deg: float | None,
-        noise_deg: float,
-        sensors: SensorPair | None,
-        seed: int,
-    ) -> None:
-        sensors_of(noise_deg)  # refuses it alike
-        if sensors is not None:
-            raise ParameterError.of("sensors", sensors, "left out where the plant is not a throttle: give noise_deg")
-        if start_deg is not None and plate.model is None:
-            raise ParameterError.of("start_deg", start_deg, "left out: a plant of your own starts where it is")
-        first = float(reference.angle_deg[0])
-        self._plant: PlatePlant = plate.moving(reference.sample_s, first if start_deg is None else start_deg)
-        self.start_deg = self._angle()
-        self._noise, self._rng = noise_deg, np.random.default_rng(seed)
-
-    def _angle(self) -> float:
-        given = self._plant.output
-        try:
-            angle = float(given() if callable(given) else given)
-        except TypeError:
-            raise ParameterError.of("output of the plant", given, "one number, the angle now [deg]") from None
-        ParameterError.unless(math.isfinite(angle), "output of the plant", angle, "a finite angle [deg]")
-        return angle
-
-    def step(self, *, duty: float, **_none: float) -> dict[str, float]:
-        self._plant.step(float(np.clip(duty, -1.0, 1.0)))
-        angle = self._angle()
-        return {"angle_deg": angle, "sensed_angle_deg": angle + self._noise * float(self._rng.standard_normal())}
-
-
 def _run_in_python(
     controller: AngleController,
-    plant: VirtualThrottle | _OwnPlate,
+    plant: VirtualThrottle | OwnPlate,
     reference_deg: NDArray[np.float64],
     delay_samples: int,
     airflow: NDArray[np.float64],

@@ -14,6 +14,7 @@ from mgdd.loop.controller_families import Setup, groups_of
 from mgdd.loop.many_tracks import track_many
 from mgdd.loop.plates import PlateLike, PlatePlant, plate_of
 from mgdd.loop.reference import Reference
+from mgdd.loop.track import SWINGS_DEG
 from mgdd.loop.tuned import family_of, shipped_numbers
 from mgdd.parallel.finished import hand_over
 from mgdd.results.result import NumbersResult
@@ -84,7 +85,7 @@ def tracking_cost(runs: xr.Dataset) -> float:
             continue
         settling = np.nan_to_num(run["settling_ms"].to_numpy(), nan=1e9)
         total += np.minimum(settling / goal, _MOST)
-        total += 5.0 * (run["limit_cycle_deg"].to_numpy() > 0.5)
+        total += 5.0 * (run["limit_cycle_deg"].to_numpy() > SWINGS_DEG)
         total += np.minimum(run["static_error_deg"].to_numpy() / 0.1, _MOST) / 6.0
         total += 0.5 * np.minimum(run["overshoot_deg"].to_numpy(), 10.0) / 6.0
     total += np.minimum(runs["total_variation"].mean("reference").to_numpy() / 20.0, _MOST)

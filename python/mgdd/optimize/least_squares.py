@@ -33,6 +33,7 @@ def least_squares(
     bounds: tuple[ArrayLike | None, ArrayLike | None] | None = None,
     log_scaled: ArrayLike | None = None,
     data: ArrayLike | None = None,
+    records: Sequence[int] | None = None,
     max_iterations: int = 200,
     cost_tolerance: float = 1e-12,
     correlation_limit: float = 0.98,
@@ -58,6 +59,9 @@ def least_squares(
         Parameters searched as log(p); they need lower bounds > 0. Everything reported stays in natural units.
     data : array_like, shape (m,), optional
         What the residual compares with, in its unit; gives `FitReport.nrmse_fit_percent`.
+    records : sequence of int, optional
+        Residuals of each record, in the order of time: residuals that are correlated in time then widen the standard
+        errors, which are those of a jackknife over blocks (Kuensch 1989). All count as independent if left out.
     max_iterations : int
         Trial steps.
     cost_tolerance : float
@@ -79,6 +83,7 @@ def least_squares(
 
     References
     ----------
+    Kuensch (1989), The jackknife and the bootstrap for general stationary observations.
     Moré (1978), The Levenberg-Marquardt algorithm: implementation and theory.
     Nielsen (1999), Damping parameter in Marquardt's method.
 
@@ -109,7 +114,8 @@ def least_squares(
     )
     measured = None if data is None else _vector(data, "data")
     return FitReport.from_core(
-        _core.optimize.least_squares(fun, start, parameters=parameters, options=options), measured
+        _core.optimize.least_squares(fun, start, parameters=parameters, options=options, records=records or []),
+        measured,
     )
 
 
@@ -213,7 +219,7 @@ def fit_of(report: FitReport, model: Any, run: xr.Dataset | None, errors: Iterab
     ranked = tuple(sorted(errors))
     fields = {
         "kind": model.kind,
-        "train": None if run is None else quality_of(run),
+        "train": None if run is None or "train" in more else quality_of(run),
         "findings": report.findings,
         "unidentifiable": report.unidentifiable,
         "n_best": n_best_of(ranked),

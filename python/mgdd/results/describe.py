@@ -149,7 +149,8 @@ def dataset_text(data: Any) -> str:
         few = values.size <= _FEW and values.ndim == 1
         shown[str(name)] = each.item() if not each.ndim else values if few else _range(values, "")
     units = {str(name): label_of(each).units for name, each in data.data_vars.items() if "units" in each.attrs}
-    return as_text(f"Dataset over {over}" if over else "Dataset", rows_of(shown, units))
+    text = as_text(f"Dataset over {over}" if over else "Dataset", rows_of(shown, units))
+    return "\n".join([text, *(f"  {line}" for line in str(data.attrs.get("findings", "")).splitlines())])
 
 
 def described(

@@ -3,10 +3,11 @@
 // raise the J of the whole map most: the knowledge gradient (Frazier, Powell and Dayanik 2009) summed over the cells,
 // and what less doubt about the limits that hold cells back would free. `ask` gives the input that is worth most at a
 // point that others choose. Nothing is asked far from what was read or from the best of its cell where there are
-// limits, nor where one may break in forty readings by more than the stated probability lets it. A visit that is odd is
-// made again before it counts. Where no input is known to be safe the map gives the one that most likely is. With a
-// guide the model is the mean, with a factor and a place that are learnt; what it misses is a smooth function of point
-// and input. ask and tell are noexcept and allocation-free; all randomness is a function of (seed, readings).
+// limits, nor where one may break in forty readings by more than the stated probability lets it; a cell where nothing
+// may be asked is entered at its surest input once nothing more than noise is to be learnt elsewhere. A visit that is
+// odd is made again before it counts. Where no input is known to be safe the map gives the one that most likely is.
+// With a guide the model is the mean, with a factor and a place that are learnt; what it misses is a smooth function of
+// point and input. ask and tell are noexcept and allocation-free; all randomness is a function of (seed, readings).
 #pragma once
 
 #include <array>
@@ -150,7 +151,7 @@ class MapSeeking {
   void require_usable() const;
 
  private:
-  static constexpr int spread = 20, near = 12, per_place = 1 + near + spread;
+  static constexpr int spread = 14, near = 20, per_place = 1 + near + spread;
   static constexpr int most_visits = 6;  // of a cell, that are compared
   static constexpr std::int64_t most_again = 2;
   static constexpr double odd_visit = 12.0;  // squared standard deviations, from which on it is taken again
