@@ -156,4 +156,4 @@ def test_a_map_over_the_load_steps_of_the_measured_engine() -> None:
         (found,) = sought(surrogate, guide, seed=0, stops=(16,), block_cycles=1)
         lost[name] = judge.of_search(found)[0]
     (found,) = sought(surrogate, {}, seed=0, stops=(16,), block_cycles=1)
-    assert lost["1500 cycles"] < 0.03 < lost["25 held steps"] < judge.of_search(found)[0]
+    assert max(lost.values()) < 0.03 < judge.of_search(found)[0]

@@ -137,7 +137,7 @@ class ProcessModel {
 
  private:
   static constexpr int evidence_readings = 60, more_readings = 40;
-  static constexpr int together = 8;            // points whose covariances are made at once: as many as a cell's visits
+  static constexpr int together = 8;            // points whose covariances are made at once
   static constexpr double most_trusted = 81.0;  // of what a variance is multiplied by: nine standard deviations
   static constexpr double few_readings = 2.0;   // over degrees of freedom
   // Logarithms: bend, noise over bend, size of the rest over bend, lengths; how fast slopes and level wander, over the

@@ -151,8 +151,9 @@ class MapSeeking {
   void require_usable() const;
 
  private:
+  // Candidates of a place, from everywhere and near its best. With 12 near an adiabatic guide loses half as much again.
   static constexpr int spread = 14, near = 20, per_place = 1 + near + spread;
-  static constexpr int most_visits = 6;  // of a cell, that are compared
+  static constexpr int most_visits = 6;  // of a cell, that are compared; eight find no better map
   static constexpr std::int64_t most_again = 2;
   static constexpr double odd_visit = 12.0;  // squared standard deviations, from which on it is taken again
   static constexpr double given_up = 3.0;    // failures of a cell in a row, then it is left alone
