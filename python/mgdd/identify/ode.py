@@ -265,7 +265,7 @@ def _delay_of(given: float | tuple[float, float]) -> tuple[float, tuple[float, f
 
 
 def _inputs_of(table: Any, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    time, *columns = columns_of(table_of(table, names, what="record"), names[:-1], what="record")
+    time, *columns = columns_of(table_of(table, names, what="records"), names[:-1], what="records")
     even_step(time)
     return time, np.column_stack(columns)
 
@@ -281,9 +281,9 @@ class _Run:
 
     @classmethod
     def of(cls, table: Any, names: Sequence[str], drive: Drive, skip: int, sigma: Any) -> _Run:
-        columns, name, n = table_of(table, names, what="record"), names[-1], drive.time_s.size
+        columns, name, n = table_of(table, names, what="records"), names[-1], drive.time_s.size
         if name not in columns:
-            columns_of(columns, [name], what="record")  # says what is there
+            columns_of(columns, [name], what="records")  # says what is there
         measured = as_floats(columns[name])
         if measured.shape != (n,):
             raise ShapeError(f"{', '.join(names)} have shapes {[(n,), measured.shape]}: must be columns of one length")
