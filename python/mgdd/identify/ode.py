@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -238,7 +239,7 @@ def _several(record: Any) -> bool:
 
 
 def _per_record(sigma: Any, records: int) -> list[Any]:
-    if records == 1 or np.ndim(sigma) == 0:
+    if records == 1 or isinstance(sigma, Real):
         return [sigma] * records
     if len(sigma) != records:
         raise ShapeError.of("sigma", sigma, f"one number, or one entry per record, {records}")

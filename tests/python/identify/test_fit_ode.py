@@ -234,6 +234,12 @@ def test_several_records_share_parameters_and_each_has_its_start():
     found = fit_ode(spring, records, initial_state=np.zeros((3, 2)), **settings)
     assert found.report.names[3:5] == ("state_0_of_0", "state_1_of_0")
     assert np.all(np.abs(found.report.values - [*TRUE, *np.ravel(starts)]) < 5 * found.report.stderr)
+    levels = [np.full(each["y"].size, 0.002) for each in records]
+    known = fit_ode(spring, records, initial_state=np.zeros((3, 2)), sigma=levels, **settings)
+    np.testing.assert_allclose(known.report.values, found.report.values, rtol=1e-6)
+    assert known.report.rmse == pytest.approx(1.0, abs=0.1)
+    with pytest.raises(ShapeError, match="sigma"):
+        fit_ode(spring, records, initial_state=np.zeros((3, 2)), sigma=levels[:2], **settings)
     one = fit_ode(spring, records[0], initial_state=[0.0, 0.0], **settings)
     assert np.all(found.report.stderr[:3] < one.report.stderr[:3])
     reversed_ = fit_ode(spring, records[::-1], initial_state=np.zeros((3, 2)), **settings)
