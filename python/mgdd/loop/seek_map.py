@@ -20,6 +20,7 @@ from mgdd.loop.plant import Plant
 from mgdd.loop.seek import plant_of, seek_inputs, started
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.loop.virtual_test_bed import VirtualTestBed
+from mgdd.maps import CalibrationMap
 from mgdd.optimize import Input
 from mgdd.optimize.map_seeking import MapSeeking, entries_of, input_nodes
 from mgdd.presets.meant import cylinder_of
@@ -165,6 +166,16 @@ def seek_map(
     require_end(visits, tolerance)
     before = list(seeker.visits) if isinstance(seeker, MapSearch) else []
     seeker = seeker.seeker if isinstance(seeker, MapSearch) else seeker
+    own = {"limits": limits or None, "guide": guide, "limit_guides": limit_guides, "start": start, "settings": settings}
+    if seeker is not None:
+        _require_same(seeker, axes, own)
+    for name, one in {"guide": guide, **(limit_guides or {})}.items():
+        if isinstance(one, CalibrationMap):
+            raise ParameterError.of(
+                name, one,
+                "a model of the objective or a limit, and this map says where the best input lies: give the model that "
+                "it was made with, or go on from its search with seeker=",
+            )  # fmt: skip
     sides = both_sides(limits) if seeker is None else tuple(seeker.settings["limits"])
     sought = seek_inputs(inputs) if seeker is None else tuple(seeker.settings["inputs"])
     entries = entries_of(axes, [one.name for one in sought]) if seeker is None else seeker.axes
@@ -184,6 +195,18 @@ def seek_map(
             start=started(start, sought), smoothness=smoothness, maximize=maximize, seed=seed,
         )  # fmt: skip
     return _searched(with_lower_sides(driven, sides), seeker, dwell, before, visits, tolerance, record, on_visit)
+
+
+def _require_same(seeker: MapSeeking, axes: Any, own: Mapping[str, Any]) -> None:
+    """Refuse what a search that goes on would not heed."""
+    for name, given in own.items():
+        if given is not None:
+            raise ParameterError.of(name, given, "left out beside seeker, whose search has its own")
+    entries = entries_of(axes, seeker.input_names)
+    if list(entries) != list(seeker.axes) or any(
+        not np.array_equal(entries[name], column) for name, column in seeker.axes.items()
+    ):
+        raise ParameterError.of("axes", axes, f"those of the seeker: {', '.join(seeker.axes)} with the same entries")
 
 
 def _is_engine(guide: Any) -> bool:
@@ -291,7 +314,9 @@ def _searched(
                     settled = 0 if tolerance is None else int((cells <= tolerance).sum())
                     on_visit(Progress(seeker.readings, visit, so_far.regret, settled, so_far))
                 if tolerance is not None and seeker.readings >= fewest and regret <= tolerance:
-                    break
+                    following = seeker.suggest()
+                    if (following.at, following.inputs) != (visit.at, visit.inputs):  # an odd visit is made again
+                        break
     except KeyboardInterrupt:
         part = MapSearch.of(seeker, made, tolerance=tolerance, interrupted=True)
         raise Interrupted(

@@ -21,7 +21,10 @@ constexpr int first_draws = 400;
 constexpr double first_step = 0.1;  // ranges
 constexpr std::uint64_t regret_samples = 32;
 constexpr double least_pivot = 1e-6;   // of the largest variance
+constexpr double least_known = 1e-10;  // of a squared bend: a variance below it is not told from rounding
+constexpr double least_share = 1e-2;   // of that, so that rounding leaves a matrix positive
 constexpr double least_effect = 1e-9;  // of a standard deviation
+constexpr double little = 1e-3;        // of what J was read to range over: nothing more is to be gained
 
 }  // namespace
 
@@ -146,6 +149,48 @@ double MapSeeking::gain_of(int point, const double* covariances) noexcept {
   return out;
 }
 
+// Of a cell where nothing may be asked the input that most likely keeps the limits, as all do a standard deviation
+// above their means, or if that is dared their means; -1 without one.
+int MapSeeking::surest(std::size_t c, bool dare) const noexcept {
+  int out = -1;
+  for (int k = 0; k < per_place; ++k) {
+    const int p = point_of(c, k);
+    if (!within_reach(p)) continue;
+    const auto broken = [&](const LimitProcess& one) {
+      return one.excess(p, 0.0) + (dare ? 0.0 : one.sd(p) / one.widening()) > 0.0;
+    };
+    if (std::ranges::any_of(limited_, broken)) continue;
+    if (out < 0 || odds_[static_cast<std::size_t>(p)] < odds_[static_cast<std::size_t>(out)]) out = p;
+  }
+  return out;
+}
+
+// Where what is believed has not been put to the test: where nothing may be asked, where the first visit failed and, if
+// that is dared, where nothing was read; the cell farthest from all that were read before those that were, of these the
+// least read; -1 where there is none.
+int MapSeeking::untried(bool dare) const noexcept {
+  const auto apart = [this](std::size_t c) {
+    double out = std::numeric_limits<double>::infinity();
+    for (std::size_t other = 0; other < cells(); ++other) {
+      if (read_[other] > 0.0) out = std::min(out, (places_[other].context - places_[c].context).squaredNorm());
+    }
+    return out;
+  };
+  int out = -1;
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < cells(); ++c) {
+    const bool open = places_[c].visit >= 0, doubted = read_[c] == 0.0 && (dare || failures_[c] > 0.0);
+    if (failures_[c] >= given_up || (open && !doubted)) continue;
+    const double own = read_[c] > 0.0 ? -read_[c] : apart(c);
+    if (own <= most) continue;
+    const int p = open ? places_[c].visit : surest(c, dare);
+    if (p < 0) continue;
+    out = p;
+    most = own;
+  }
+  return out;
+}
+
 const MapSeeking::Visit& MapSeeking::suggest() noexcept {
   if (cells() == 0) return visit_;
   if (!known()) {
@@ -166,11 +211,11 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
   double most = -1.0;
   int next = -1;
   for (std::size_t c = 0; c < cells(); ++c) {
-    places_[c].closed = false;
+    places_[c].visit = -1;
     if (failures_[c] >= given_up) continue;
     std::array<int, most_visits> visits{};
     const int count = visits_of(c, visits);
-    if (count == 0) places_[c].closed = true;
+    double largest = -1.0;
     j_.covariances(std::span(visits).first(static_cast<std::size_t>(count)), all_safe, effects_);
     const bool elsewhere = (cell(c) - last_context_).cwiseAbs().maxCoeff() > 0.0;
     const double works = std::pow(by_chance, failures_[c]);  // that a cell which has failed so often does
@@ -178,19 +223,23 @@ const MapSeeking::Visit& MapSeeking::suggest() noexcept {
     for (int k = 0; k < count; ++k) {
       const int p = visits[static_cast<std::size_t>(k)];
       const double gain = gain_of(p, &effects_(k, 0));
+      if (gain > largest) {
+        largest = gain;
+        places_[c].visit = p;
+      }
       if (counts * gain <= most) continue;
       most = counts * gain;
       next = p;
       visit_.gain = gain;
     }
   }
-  // Cells without an input that may be asked are entered once nothing more than noise is to be learnt elsewhere.
-  if (next < 0 || visit_.gain < j_.noise_sd() / std::sqrt(settings_.averaged)) {
-    const int entered = least_unsafe(all_cells());
-    if (next < 0 || (entered >= 0 && mean_over_[static_cast<std::size_t>(entered)] <= 0.0)) {
-      next = std::max(entered, 0);
-      visit_.gain = 0.0;
-    }
+  const double nothing = little * (j_.highest() - j_.lowest());
+  const double noise = std::max(j_.noise_sd() / std::sqrt(settings_.averaged), nothing);
+  const bool grown = static_cast<double>(told_) >= cautious_readings * static_cast<double>(1 + context_ + inputs_);
+  const int other = next >= 0 && visit_.gain < noise ? untried(grown && visit_.gain < nothing) : -1;
+  if (next < 0 || other >= 0) {
+    next = next < 0 ? least_unsafe(all_cells()) : other;
+    visit_.gain = 0.0;
   }
   visit_.sd = j_.sd(next);
   visit_.context = cell(place_of(next));
@@ -260,9 +309,10 @@ void MapSeeking::sample(std::size_t c, Best& out) noexcept {
       joint_(a, b) = j_.covariance(at(a), at(b));
     widest = std::max(widest, joint_(a, a));
   }
-  if (!(widest > 0.0)) return;
+  const double rounding = least_known * std::pow(j_.bend(), 2.0);
+  if (!(widest > rounding)) return;
   for (Eigen::Index a = 0; a < n; ++a)
-    joint_(a, a) = std::max(joint_(a, a), 0.0) + least_pivot * widest;
+    joint_(a, a) = std::max(joint_(a, a), 0.0) + std::max(least_pivot * widest, least_share * rounding);
   cholesky(joint_, n);
   Inputs squares = Inputs::Zero(inputs_);
   for (std::uint64_t s = 0; s < regret_samples; ++s) {

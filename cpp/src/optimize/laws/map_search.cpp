@@ -222,7 +222,8 @@ void MapSeeking::search(std::span<Place> places) noexcept {
 }
 
 // Of a place without an input that is known to be safe, the one that is worth most of those that are as likely to keep
-// the limits as any, to `limit_probability`: towards the likeliest one that says little more.
+// the limits as any, to `limit_probability`: towards the likeliest one that says little more. Where even that surely
+// breaks one, the one that breaks them least.
 void MapSeeking::know_likeliest(std::size_t c, Place& place) noexcept {
   const auto likely = [this](int p) {
     return 0.5 * std::erfc(odds_[static_cast<std::size_t>(p)] / std::numbers::sqrt2);
@@ -230,7 +231,7 @@ void MapSeeking::know_likeliest(std::size_t c, Place& place) noexcept {
   double likeliest = 0.0, most = -std::numeric_limits<double>::infinity();
   for (int k = 0; k < per_place; ++k)
     likeliest = std::max(likeliest, likely(point_of(c, k)));
-  if (!(likeliest > 0.0)) return;
+  if (!(likeliest > 1.0 - settings_.limit_probability)) return;
   for (int k = 0; k < per_place; ++k) {
     const int p = point_of(c, k);
     if (likely(p) < settings_.limit_probability * likeliest || worth(p) <= most) continue;
@@ -275,16 +276,20 @@ bool MapSeeking::safe(int point, const Place& place) const noexcept {
          (z - towards).cwiseAbs().maxCoeff() <= settings_.reach;
 }
 
-// Of places where no input may be asked, not far from what was read: the one that most likely keeps its limits, or -1.
+// Whether a candidate is not far from what was read.
+bool MapSeeking::within_reach(int point) const noexcept {
+  const Inputs z = candidates_.row(point).tail(inputs_).transpose();
+  return std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff()) <= reach_beyond_read * settings_.reach;
+}
+
+// Where nothing is safe: not far from what was read, the one that most likely keeps its limits.
 int MapSeeking::least_unsafe(std::span<const Place> places) const noexcept {
-  int best = -1;
+  int best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (int p = 0; p < last_point(); ++p) {
-    const Inputs z = candidates_.row(p).tail(inputs_).transpose();
-    const double beyond = std::max((lowest_ - z).maxCoeff(), (z - highest_).maxCoeff());
     const double own = mean_over_[static_cast<std::size_t>(p)];
-    if (!places[place_of(p)].closed) continue;
-    if (beyond > reach_beyond_read * settings_.reach || own >= least) continue;
+    if (places.size() == cells() && failures_[place_of(p)] >= given_up) continue;
+    if (!within_reach(p) || own >= least) continue;
     least = own;
     best = p;
   }

@@ -150,6 +150,7 @@ MapSeeking::MapSeeking(MapSeekingSettings settings)
       failing_(map_process_settings(settings_, points_of(settings_, per_place))),
       places_(count_of(settings_.axes) + 1),
       failures_(cells(), 0.0),
+      read_(cells(), 0.0),
       lowest_(scaled(settings_.space.start)),
       highest_(lowest_),
       last_context_(Inputs::Zero(context_)),
@@ -263,6 +264,7 @@ TellStatus MapSeeking::tell(const Inputs& context, const Inputs& input, const Re
     if (cell(c) != context) continue;
     of_cell = true;
     failures_[c] = reading.misfire ? failures_[c] + 1.0 : 0.0;
+    if (!reading.misfire) read_[c] += 1.0;
   }
   failing_.record(z, !reading.misfire, z);
   failing_.fit(z);
@@ -308,6 +310,8 @@ void MapSeeking::require_usable() const {
     limited.model().require_usable();
   for (const double failures : failures_)
     require_in(closed(0.0, 1e12), "failures", failures);
+  for (const double read : read_)
+    require_in(closed(0.0, 1e12), "read", read);
   for (const Place& place : places_) {
     for (const double entry : place.from)
       require_in(closed(0.0, 1.0), "place", entry);

@@ -3,11 +3,12 @@
 // raise the J of the whole map most: the knowledge gradient (Frazier, Powell and Dayanik 2009) summed over the cells,
 // and what less doubt about the limits that hold cells back would free. `ask` gives the input that is worth most at a
 // point that others choose. Nothing is asked far from what was read or from the best of its cell where there are
-// limits, nor where one may break in forty readings by more than the stated probability lets it; a cell where nothing
-// may be asked is entered at its surest input once nothing more than noise is to be learnt elsewhere. A visit that is
-// odd is made again before it counts. Where no input is known to be safe the map gives the one that most likely is.
-// With a guide the model is the mean, with a factor and a place that are learnt; what it misses is a smooth function of
-// point and input. ask and tell are noexcept and allocation-free; all randomness is a function of (seed, readings).
+// limits, nor where one may break in forty readings by more than the stated probability lets it. Once no more than
+// noise is to be learnt, cells that were never read are, and those where nothing may be asked at their surest input. A
+// visit that is odd is made again before it counts. Where no input is known to be safe the map gives the one that most
+// likely is. With a guide the model is the mean, with a factor and a place that are learnt; what it misses is a smooth
+// function of point and input. ask and tell are noexcept and allocation-free; all randomness is a function of (seed,
+// readings).
 #pragma once
 
 #include <array>
@@ -127,6 +128,7 @@ class MapSeeking {
     v("doubts", self.doubts_, counts_end);
     v("since_doubt", self.since_doubt_, counts_end);
     v("failures", self.failures_);
+    v("read", self.read_);
     v("lowest", self.lowest_);
     v("highest", self.highest_);
     v("last_context", self.last_context_);
@@ -164,7 +166,7 @@ class MapSeeking {
     Climb climb{};
     double rough = 0.0;  // what the bends at the best cost, as its worth has it
     int known = 0;       // candidate that the map gives
-    bool closed = true;  // no input may be asked there
+    int visit = -1;      // candidate that would teach most, or that none may be asked there
   };
   /// A second difference of the map along an axis that a cell is part of, in ranges of the inputs, the axis counted in
   /// its mean steps: `own` times the input of the cell, plus those of two others.
@@ -209,6 +211,9 @@ class MapSeeking {
   void know_likeliest(std::size_t c, Place& place) noexcept;
   void choose_safe(std::span<Place> places) noexcept;
   int visits_of(std::size_t c, std::span<int> out) const noexcept;
+  bool within_reach(int point) const noexcept;
+  int surest(std::size_t c, bool dare) const noexcept;
+  int untried(bool dare) const noexcept;
   int least_unsafe(std::span<const Place> places) const noexcept;
   double gain_of(int point, const double* covariances) noexcept;
   void sample(std::size_t c, Best& out) noexcept;
@@ -226,6 +231,7 @@ class MapSeeking {
   std::int64_t told_ = 0, doubts_ = 0, since_doubt_ = 0;
   std::vector<Place> places_;     // the cells, the last axis fastest, and the point of the last `ask`
   std::vector<double> failures_;  // of the last readings of each cell, in a row
+  std::vector<double> read_;      // how often each cell was
   Inputs lowest_, highest_;       // inputs that were read, scaled
   Inputs last_context_, last_input_;
   std::int64_t again_ = 0;                // times in a row that the last reading was odd
