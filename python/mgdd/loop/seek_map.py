@@ -20,7 +20,6 @@ from mgdd.loop.plant import Plant
 from mgdd.loop.seek import plant_of, seek_inputs, started
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.loop.virtual_test_bed import VirtualTestBed
-from mgdd.maps import CalibrationMap
 from mgdd.optimize import Input
 from mgdd.optimize.map_seeking import MapSeeking, entries_of, input_nodes
 from mgdd.presets.meant import cylinder_of
@@ -169,13 +168,6 @@ def seek_map(
     own = {"limits": limits or None, "guide": guide, "limit_guides": limit_guides, "start": start, "settings": settings}
     if seeker is not None:
         _require_same(seeker, axes, own)
-    for name, one in {"guide": guide, **(limit_guides or {})}.items():
-        if isinstance(one, CalibrationMap):
-            raise ParameterError.of(
-                name, one,
-                "a model of the objective or a limit, and this map says where the best input lies: give the model that "
-                "it was made with, or go on from its search with seeker=",
-            )  # fmt: skip
     sides = both_sides(limits) if seeker is None else tuple(seeker.settings["limits"])
     sought = seek_inputs(inputs) if seeker is None else tuple(seeker.settings["inputs"])
     entries = entries_of(axes, [one.name for one in sought]) if seeker is None else seeker.axes
@@ -197,8 +189,10 @@ def seek_map(
     return _searched(with_lower_sides(driven, sides), seeker, dwell, before, visits, tolerance, record, on_visit)
 
 
-def _require_same(seeker: MapSeeking, axes: Any, own: Mapping[str, Any]) -> None:
+def _require_same(seeker: Any, axes: Any, own: Mapping[str, Any]) -> None:
     """Refuse what a search that goes on would not heed."""
+    if not isinstance(seeker, MapSeeking):
+        raise ParameterError.of("seeker", seeker, "a MapSearch, or its seeker: what seek_map has returned")
     for name, given in own.items():
         if given is not None:
             raise ParameterError.of(name, given, "left out beside seeker, whose search has its own")

@@ -162,6 +162,8 @@ class MapSeeking(_core.optimize.MapSeeking):
         if limit_guides:
             given["limit_guides"] = _limit_guides(limit_guides, [one.name for one in kept], over)
         middle = {one.name: 0.5 * (one.lower + one.upper) for one in sought} if start is None else start
+        if "context" in settings:
+            raise ParameterError.of("context", settings["context"], "left out: the axes are the context")
         context = [_core.optimize.Input(name, float(column[0]), float(column[-1])) for name, column in entries.items()]
         super().__init__(
             start=named_values("start", middle, names), inputs=list(sought), context=context,
@@ -367,12 +369,15 @@ def entries_of(axes: Any, inputs: Sequence[str]) -> dict[str, np.ndarray[Any, np
         raise ParameterError.of(
             argument("axes"), axes, "names with their entries, for example {'fuel_mg': [6, 20, 40]}"
         )
-    out = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in axes.items()}
-    for name, column in out.items():
-        if column.size < 2 or not np.isfinite(column).all() or not (np.diff(column) > 0.0).all():
+    out = {}
+    for name, entries in axes.items():
+        column = np.array(entries, ndmin=1)
+        numbers = column.ndim == 1 and column.dtype.kind in "iuf" and column.size > 1
+        if not numbers or not np.isfinite(column).all() or not (np.diff(column) > 0.0).all():
             raise ParameterError.of(
-                f"{argument('axes')} of {name}", column.tolist(), "two entries at least, finite, increasing"
+                f"{argument('axes')} of {name}", column.tolist(), "two entries at least, finite numbers, increasing"
             )
+        out[str(name)] = column.astype(np.float64)
     if twice := [name for name in inputs if name in out]:
         raise ParameterError(f"{argument('inputs')}: {', '.join(twice)} is an axis too: name it in one of them")
     return out

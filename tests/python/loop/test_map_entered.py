@@ -11,6 +11,7 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.loop import seek_map
+from mgdd.optimize import MapSeeking
 
 SOC = {"soc": (-20.0, 10.0)}
 SPEEDS = {"rpm": [1000, 2000, 3000]}
@@ -114,6 +115,13 @@ def test_a_map_is_no_model_and_a_search_that_goes_on_heeds_its_own_terms() -> No
     for name, value in (("limits", {"p": 1.0}), ("guide", engine), ("start", {"soc": 0.0}), ("settings", {"kept": 50})):
         with pytest.raises(ParameterError, match=f"{name} .*left out beside seeker"):
             seek_map(engine, SOC, SPEEDS, visits=8, seeker=found, **{name: value})
+    for axes in ({"rpm": ["a", "b"]}, {"rpm": [[1.0, 2.0], [3.0, 4.0]]}, {"rpm": [5.0]}):
+        with pytest.raises(ParameterError, match=r"axes of rpm .*two entries at least"):
+            seek_map(engine, SOC, axes, visits=6)
+    with pytest.raises(ParameterError, match="seeker = 3: must be a MapSearch"):
+        seek_map(engine, SOC, SPEEDS, visits=6, seeker=3)
+    with pytest.raises(ParameterError, match=r"context .*left out: the axes are"):
+        MapSeeking(SOC, SPEEDS, context=[])
     with pytest.raises(ParameterError, match=r"axes .*those of the seeker"):
         seek_map(engine, SOC, {"rpm": [1000, 2000]}, visits=8, seeker=found)
     assert len(seek_map(engine, SOC, SPEEDS, visits=8, seeker=found).visits) == 8
