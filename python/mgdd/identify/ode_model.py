@@ -225,10 +225,10 @@ class Drive:
         if delay_s == 0.0:
             held = np.repeat(self.inputs[:-1], self.substeps, axis=0)
             return self.inputs, np.repeat(held[:, None], 3, axis=1)
-        times = np.concatenate([[self.time_s[0] - delay_s - 1.0], self.time_s, [self.time_s[-1] + 1.0]])
-        areas = np.vstack([self.inputs[:1], self.inputs]) * np.diff(times)[:, None]
+        knots = np.concatenate([[self.time_s[0] - delay_s - 1.0], self.time_s, [self.time_s[-1] + 1.0]])
+        areas = np.vstack([self.inputs[:1], self.inputs]) * np.diff(knots)[:, None]
         whole = np.vstack([np.zeros_like(areas[:1]), np.cumsum(areas, axis=0)])
-        until = np.column_stack([np.interp(ends, times, column) for column in whole.T])
+        until = np.column_stack([np.interp(ends, knots, column) for column in whole.T])
         mean = np.diff(until, axis=0) / self.step_s
         at = np.searchsorted(self.time_s, self.time_s - delay_s, side="right") - 1
         return self.inputs[np.maximum(at, 0)], np.repeat(mean[:, None], 3, axis=1)
