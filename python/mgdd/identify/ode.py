@@ -4,31 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mgdd import _core
-from mgdd._arguments import as_floats, shown
-from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.ode_model import (
-    Derivative,
-    Drive,
-    Interpolation,
-    OdeModel,
-    Output,
-    output_or_first_state,
-    run_in_lockstep,
-)
+from mgdd._arguments import shown
+from mgdd.errors import ParameterError
+from mgdd.identify.ode_model import Derivative, Interpolation, OdeModel, Output, output_or_first_state, run_in_lockstep
+from mgdd.identify.ode_records import OdeRecord, records_of, states_of
 from mgdd.optimize import least_squares
 from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of, spread_starts
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.results import Fit
 from mgdd.results.fit_report import FitReport
-from mgdd.signals.even_grid import even_step
-from mgdd.signals.model import columns_of, table_of
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
@@ -137,28 +127,25 @@ def fit_ode(
     >>> time = np.linspace(0.0, 10.0, 201)
     >>> def lag(t, x, u, p):
     ...     return (p[0] * u[0] - x) / p[1]
-    >>> y = np.where(time > 0.3, 2.0 * (1.0 - np.exp(-(time - 0.3) / 0.5)), 0.0)
-    >>> record = {"time_s": time, "u": (time > -1e-9) * 1.0, "y": y}
-    >>> record["u"][0] = 0.0
+    >>> u = np.where(time > 0.99, 1.0, 0.0)
+    >>> y = np.where(time > 1.3, 2.0 * (1.0 - np.exp(-(time - 1.3) / 0.5)), 0.0)
+    >>> record = {"time_s": time, "u": u, "y": y}
     >>> start = {"gain": 1.0, "time_constant_s": 1.0}
     >>> fit = fit_ode(lag, record, parameters=start, initial_state=[0.0], input_delay_s=(0.0, 1.0))
     >>> fit.report.values.round(2).tolist()
-    [2.0, 0.5, 0.25]
+    [2.0, 0.5, 0.3]
     """
     chosen_options = fit_options(options, n_starts=1, seed=0, max_iterations=100, tolerance=1e-9)
     n_starts = chosen_options.n_starts
     ParameterError.unless(substeps >= 1, "substeps", substeps, ">= 1")
-    names = ("time_s", *input_names, output_name)
-    given = list(record) if _several(record) else [record]
-    sigmas = _per_record(sigma, len(given))
-    runs = [
-        _Run.of(table, names, Drive(*_inputs_of(table, names), substeps, interpolation), skip, own)
-        for table, own in zip(given, sigmas, strict=True)
-    ]
-    states = _states_of(initial_state, len(runs))
+    runs = records_of(
+        record, ("time_s", *input_names, output_name), interpolation=interpolation, substeps=substeps, skip=skip,
+        sigma=sigma,
+    )  # fmt: skip
+    states = states_of(initial_state, len(runs))
     delay, delay_bounds = _delay_of(input_delay_s)
-    all_names = list(parameters)
-    chosen = all_names if free is None else [name for name in all_names if name in set(free)]
+    names = list(parameters)
+    chosen = names if free is None else [name for name in names if name in set(free)]
     free_states = [f"state_{i}" for i in free_state]
     starts_of = {f"{own}_of_{k}": own for k in range(len(runs)) for own in free_states}
     if len(runs) == 1:
@@ -169,14 +156,14 @@ def fit_ode(
             raise ParameterError(f"parameter name {name!r} appears twice: names must be unique")
     for mentioned in (free or (), bounds or (), log_scaled):
         for name in mentioned:
-            if name not in all_names and name not in free_states and name not in unknowns:
+            if name not in names and name not in free_states and name not in unknowns:
                 raise ParameterError(
-                    f"{name!r}: no parameter of this model; it has {', '.join([*all_names, *free_states])}"
+                    f"{name!r}: no parameter of this model; it has {', '.join([*names, *free_states])}"
                 )
     if any(not 0 <= i < states.shape[1] for i in free_state):
         raise ParameterError.of("free_state", list(free_state), f"indices of the {states.shape[1]} states")
-    p0 = np.array([float(parameters[name]) for name in all_names])
-    where = [all_names.index(name) for name in chosen]
+    p0 = np.array([float(parameters[name]) for name in names])
+    where = [names.index(name) for name in chosen]
     known = {_DELAY: delay_bounds or (0.0, 0.0), **(bounds or {})}
     limits = [known.get(name, known.get(starts_of.get(name, name), (-np.inf, np.inf))) for name in unknowns]
     lower, upper = (np.array([ends[side] for ends in limits], dtype=np.float64) for side in (0, 1))
@@ -213,7 +200,7 @@ def fit_ode(
     model = OdeModel(
         derivative=derivative,
         output=read,
-        parameters=dict(zip(all_names, p.tolist(), strict=True)),
+        parameters=dict(zip(names, p.tolist(), strict=True)),
         initial_state=tuple(start[0].tolist()),
         substeps=substeps,
         input_names=tuple(input_names),
@@ -225,82 +212,11 @@ def fit_ode(
     run, quality = None, None
     if np.isfinite(best.rmse):
         first = runs[0]
-        simulated = model.simulate(given[0])[output_name].to_numpy()
+        simulated = model.simulate(first.table)[output_name].to_numpy()
         run = fit_run(first.drive.time_s, first.measured, simulated, model._label(output_name))
         quality = quality_of(run.isel(time_s=first.kept))
     fit = fit_of(best, model, run, errors, train=quality, start_reports=tuple(reports))
     return hand_over(fit, stop)
-
-
-def _several(record: Any) -> bool:
-    """Whether these are records, and not the columns of one."""
-    tables = isinstance(record, list | tuple) and len(record) > 0
-    return tables and all(isinstance(each, Mapping) or hasattr(each, "columns") for each in record)
-
-
-def _per_record(sigma: Any, records: int) -> list[Any]:
-    if records == 1 or isinstance(sigma, Real):
-        return [sigma] * records
-    if len(sigma) != records:
-        raise ShapeError.of("sigma", sigma, f"one number, or one entry per record, {records}")
-    return list(sigma)
-
-
-def _states_of(given: ArrayLike, records: int) -> NDArray[np.float64]:
-    states = np.array(given, dtype=np.float64)
-    if states.ndim == 1:
-        states = np.repeat(states[None], records, axis=0)
-    if states.ndim != 2 or states.shape[0] != records or not np.isfinite(states).all():
-        rows = "a vector" if records == 1 else f"a vector, or {records} of them,"
-        raise ShapeError(f"initial_state: must be {rows} of finite numbers, one per state")
-    return states
-
-
-def _delay_of(given: float | tuple[float, float]) -> tuple[float, tuple[float, float] | None]:
-    ends = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    if ends.shape not in ((1,), (2,)) or not np.isfinite(ends).all() or ends[0] < 0.0 or ends[-1] < ends[0]:
-        raise ParameterError.of(_DELAY, shown(given), "a delay >= 0 [s], or its two bounds")
-    if ends.size == 1 or ends[0] == ends[1]:
-        return float(ends[0]), None
-    return float(ends.mean()), (float(ends[0]), float(ends[1]))
-
-
-def _inputs_of(table: Any, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    time, *columns = columns_of(table_of(table, names, what="records"), names[:-1], what="records")
-    even_step(time)
-    return time, np.column_stack(columns)
-
-
-@dataclass(frozen=True)
-class _Run:
-    """One record: what drives it, its output, and the samples that count, with their noise level."""
-
-    drive: Drive
-    measured: NDArray[np.float64]
-    kept: NDArray[np.int_]
-    sigma: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, table: Any, names: Sequence[str], drive: Drive, skip: int, sigma: Any) -> _Run:
-        columns, name, n = table_of(table, names, what="records"), names[-1], drive.time_s.size
-        if name not in columns:
-            columns_of(columns, [name], what="records")  # says what is there
-        measured = as_floats(columns[name])
-        if measured.shape != (n,):
-            raise ShapeError(f"{', '.join(names)} have shapes {[(n,), measured.shape]}: must be columns of one length")
-        if np.isinf(measured).any():
-            raise DataError(f"{name}: sample {int(np.argmax(np.isinf(measured)))} is not a finite number")
-        ParameterError.unless(0 <= skip < n, "skip", skip, f"within [0, {n - 1}]")
-        levels = np.asarray(sigma, dtype=np.float64)
-        if levels.ndim > 0 and levels.shape != (n,):
-            raise ShapeError.of("sigma", levels.shape, f"one number, or one per sample, {n}")
-        levels = np.broadcast_to(levels, (n,))
-        kept = np.flatnonzero(np.isfinite(measured) & (np.arange(n) >= skip))
-        if kept.size == 0:
-            raise DataError(f"{name}: every sample is missing (NaN) or skipped")
-        wrong = ~(np.isfinite(levels[kept]) & (levels[kept] > 0.0))
-        ParameterError.unless(not wrong.any(), "sigma", float(levels[kept][int(np.argmax(wrong))]), "> 0")
-        return cls(drive, measured, kept, levels[kept])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -309,7 +225,7 @@ class _Search:
 
     derivative: Derivative
     output: Output
-    runs: Sequence[_Run]
+    runs: Sequence[OdeRecord]
     p0: NDArray[np.float64]
     states: NDArray[np.float64]
     delay: float
@@ -363,3 +279,12 @@ class _Search:
             own = first + k * len(self.free_state)
             states[k, list(self.free_state)] = x[own : own + len(self.free_state)]
         return p, states, x[-1] if self.delay_free else np.full(m, self.delay)
+
+
+def _delay_of(given: float | tuple[float, float]) -> tuple[float, tuple[float, float] | None]:
+    ends = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    if ends.shape not in ((1,), (2,)) or not np.isfinite(ends).all() or ends[0] < 0.0 or ends[-1] < ends[0]:
+        raise ParameterError.of(_DELAY, shown(given), "a delay >= 0 [s], or its two bounds")
+    if ends.size == 1 or ends[0] == ends[1]:
+        return float(ends[0]), None
+    return float(ends.mean()), (float(ends[0]), float(ends[1]))

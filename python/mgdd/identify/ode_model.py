@@ -79,6 +79,8 @@ class OdeModel(SampledModel):
     input_delay_s: float = 0.0
 
     def __post_init__(self) -> None:
+        delay_s = self.input_delay_s
+        ParameterError.unless(0.0 <= delay_s < np.inf, "input_delay_s", delay_s, "a delay >= 0 [s]")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "state_names", tuple(f"state_{i}" for i in range(len(self.initial_state))))
 
@@ -209,6 +211,8 @@ class Drive:
         A delay for each of m columns adds an axis of length m. Of inputs that are held a step sees their mean over it,
         so that what a delay does is continuous.
         """
+        from scipy.interpolate import make_interp_spline
+
         if np.ndim(delay_s) > 0:
             several, which = np.unique(delay_s, return_inverse=True)
             each = [self.acting(float(one)) for one in several]
@@ -219,9 +223,13 @@ class Drive:
         n = (self.time_s.size - 1) * self.substeps
         ends = self.time_s[0] + self.step_s * np.arange(n + 1) - delay_s
         if self.interpolation != "hold":
+            spline = make_interp_spline(self.time_s, self.inputs, k=1 if self.interpolation == "linear" else 3)
+            first, last = self.time_s[0], self.time_s[-1]
             middles = 0.5 * (ends[:-1] + ends[1:])
-            steps = np.stack([self._between(at) for at in (ends[:-1], middles, ends[1:])], axis=1)
-            return self._between(self.time_s - delay_s), steps
+            samples, *nodes = (
+                spline(np.clip(at, first, last)) for at in (self.time_s - delay_s, ends[:-1], middles, ends[1:])
+            )
+            return samples, np.stack(nodes, axis=1)
         if delay_s == 0.0:
             held = np.repeat(self.inputs[:-1], self.substeps, axis=0)
             return self.inputs, np.repeat(held[:, None], 3, axis=1)
@@ -232,13 +240,6 @@ class Drive:
         mean = np.diff(until, axis=0) / self.step_s
         at = np.searchsorted(self.time_s, self.time_s - delay_s, side="right") - 1
         return self.inputs[np.maximum(at, 0)], np.repeat(mean[:, None], 3, axis=1)
-
-    def _between(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        from scipy.interpolate import make_interp_spline
-
-        within = np.clip(at, self.time_s[0], self.time_s[-1])
-        spline = make_interp_spline(self.time_s, self.inputs, k=1 if self.interpolation == "linear" else 3)
-        return np.asarray(spline(within), dtype=np.float64)
 
 
 def run_in_lockstep(

@@ -121,7 +121,7 @@ def seek_map(
         False to minimise J.
     seeker : MapSearch or MapSeeking, optional
         Go on with an earlier result, whose visits stay in the new one and whose seeker changes, or with a seeker alone;
-        it has inputs, axes, limits, guide and smoothness of its own.
+        `inputs` and `axes` must be its own, its limits, guide, start, smoothness, sense and seed count.
     record : path-like, optional
         A CSV file with a row per visit. Where it holds some, the search goes on behind them as if it had never stopped;
         a record of another search is refused.
@@ -167,7 +167,7 @@ def seek_map(
     seeker = seeker.seeker if isinstance(seeker, MapSearch) else seeker
     own = {"limits": limits or None, "guide": guide, "limit_guides": limit_guides, "start": start, "settings": settings}
     if seeker is not None:
-        _require_same(seeker, axes, own)
+        _require_same(seeker, inputs, axes, own)
     sides = both_sides(limits) if seeker is None else tuple(seeker.settings["limits"])
     sought = seek_inputs(inputs) if seeker is None else tuple(seeker.settings["inputs"])
     entries = entries_of(axes, [one.name for one in sought]) if seeker is None else seeker.axes
@@ -189,13 +189,16 @@ def seek_map(
     return _searched(with_lower_sides(driven, sides), seeker, dwell, before, visits, tolerance, record, on_visit)
 
 
-def _require_same(seeker: Any, axes: Any, own: Mapping[str, Any]) -> None:
+def _require_same(seeker: Any, inputs: Any, axes: Any, own: Mapping[str, Any]) -> None:
     """Refuse what a search that goes on would not heed."""
     if not isinstance(seeker, MapSeeking):
         raise ParameterError.of("seeker", seeker, "a MapSearch, or its seeker: what seek_map has returned")
     for name, given in own.items():
         if given is not None:
             raise ParameterError.of(name, given, "left out beside seeker, whose search has its own")
+    given = [(one.name, one.lower, one.upper) for one in seek_inputs(inputs)]
+    if given != [(one.name, one.lower, one.upper) for one in seeker.settings["inputs"]]:
+        raise ParameterError.of("inputs", inputs, f"those of the seeker: {', '.join(seeker.input_names)} in its bounds")
     entries = entries_of(axes, seeker.input_names)
     if list(entries) != list(seeker.axes) or any(
         not np.array_equal(entries[name], column) for name, column in seeker.axes.items()

@@ -206,7 +206,8 @@ def swinging(reference_deg: NDArray[np.float64], angle_deg: NDArray[np.float64],
         f"the plate swings by {spread:.2g} deg about a reference that stands still: it crosses it {own.size} times "
         f"from {own[0] * sample_s:.3g} s on",
         "make the controller for the delay of the loop (tuned_controller('guided', ..., delay_samples=...), or numbers "
-        "of tune_controller(..., delay_samples=...) for one that takes none), or lower its gains",
+        "of tune_controller(..., delay_samples=...) for one that takes none; in the shell mgdd throttle tune "
+        "--delay-samples N), or lower its gains",
     )  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -187,6 +189,8 @@ def test_a_delay_of_no_whole_samples_is_found_with_its_interval(how):
     assert high - low < 0.02
     again = fit_ode(spring, record, input_delay_s=found.model.input_delay_s, **settings)
     np.testing.assert_allclose(again.report.values, found.report.values[:3], rtol=1e-3)
+    with pytest.raises(ParameterError, match="input_delay_s"):
+        dataclasses.replace(found.model, input_delay_s=-0.1)
     read = OdeModel.from_toml(found.model.to_toml(), derivative=spring)
     assert read.simulate(record)["y"].identical(found.model.simulate(record)["y"])
 
@@ -248,7 +252,7 @@ def test_several_records_share_parameters_and_each_has_its_start():
 
 @pytest.mark.slow
 def test_intervals_hold_where_the_residual_is_correlated():
-    """Noise of an autoregression with 15 samples of memory: 80 % of each held by its interval of 95 %, white 85 %."""
+    """Noise of an autoregression with 16 samples of memory, and white: at least 85 % of the intervals of 95 % hold."""
     clean = shaken(600)
     held = {0.0: [], 0.94: []}
     for memory, inside in held.items():
@@ -262,4 +266,4 @@ def test_intervals_hold_where_the_residual_is_correlated():
             ends = np.array([found.report.interval(0.95)[name] for name in GUESS])
             inside.append((ends[:, 0] < TRUE) & (ends[:, 1] > TRUE))
     assert np.mean(held[0.0]) > 0.85
-    assert np.mean(held[0.94]) > 0.8
+    assert np.mean(held[0.94]) > 0.85

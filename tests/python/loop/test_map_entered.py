@@ -122,6 +122,8 @@ def test_a_map_is_no_model_and_a_search_that_goes_on_heeds_its_own_terms() -> No
         seek_map(engine, SOC, SPEEDS, visits=6, seeker=3)
     with pytest.raises(ParameterError, match=r"context .*left out: the axes are"):
         MapSeeking(SOC, SPEEDS, context=[])
+    with pytest.raises(ParameterError, match=r"inputs .*those of the seeker"):
+        seek_map(engine, {"soc": (-20.0, 5.0)}, SPEEDS, visits=8, seeker=found)
     with pytest.raises(ParameterError, match=r"axes .*those of the seeker"):
         seek_map(engine, SOC, {"rpm": [1000, 2000]}, visits=8, seeker=found)
     assert len(seek_map(engine, SOC, SPEEDS, visits=8, seeker=found).visits) == 8

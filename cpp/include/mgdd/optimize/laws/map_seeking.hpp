@@ -153,7 +153,7 @@ class MapSeeking {
   void require_usable() const;
 
  private:
-  // Candidates of a place, from everywhere and near its best. With 12 near an adiabatic guide loses half as much again.
+  // Candidates of a place, from everywhere and near its best. With 12 near an adiabatic guide loses a third more.
   static constexpr int spread = 14, near = 20, per_place = 1 + near + spread;
   static constexpr int most_visits = 6;  // of a cell, that are compared; eight find no better map
   static constexpr std::int64_t most_again = 2;
