@@ -28,6 +28,7 @@ _NAMED = {
     "Callable": "a function",
     "Buffer": "bytes",
 }
+_MOST = 2**31 - 1  # of a count; seeds may be larger
 _LONGEST_HOW = 240  # letters of what a missing argument is, and of the names that are known
 _BOUND = "plain, without a unit"
 _PLAIN = "give the magnitude in the unit of the name, as in soc.to('degree').magnitude"
@@ -78,6 +79,7 @@ def refusal(
     The latter names the argument that has the wrong kind; the first one of a `method` is ``self``.
     """
     culprits: list[tuple[int, _Argument, Any]] = []
+    whole: list[tuple[_Argument, Any]] = []
     for signature in signatures:
         arguments = _arguments(signature, name)[method:]
         bound = _bound(name, arguments, given, keywords)
@@ -87,6 +89,14 @@ def refusal(
             if argument.name in bound and not _fits(argument.kind, bound[argument.name]):
                 culprits.append((place, argument, bound[argument.name]))
                 break
+        else:
+            taken = [each for each in arguments if _WHOLE in map(_name, _choices(each.kind))]
+            whole += [(each, operator.index(bound[each.name])) for each in taken if bound.get(each.name) is not None]
+    if not culprits and whole:  # of the right kind, all of them: one is beyond what the core counts with
+        argument, value = min(whole, key=lambda each: (each[1] >= 0, -abs(each[1])))
+        if value < 0 or value > _MOST:
+            bound_text = "a whole number >= 0" if value < 0 else f"a whole number up to {_MOST}"
+            return ParameterError.of(argument.name, value, bound_text)
     if not culprits:
         return TypeError(f"{name}() does not take these arguments: it is {name}{' or '.join(signatures)}")
     furthest = max(place for place, _, _ in culprits)

@@ -31,7 +31,7 @@ from mgdd.engine import (
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import Curve
 from mgdd.loop import SensorDynamics, VirtualEngine, monte_carlo, run_seeker
-from mgdd.optimize import ExtremumSeeking, Limit, Spsa
+from mgdd.optimize import ExtremumSeeking, Limit, MapSeeking, Spsa
 from mgdd.throttle import SensorPair, Throttle
 
 PRESET = presets.load("puma_single")
@@ -103,6 +103,15 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: Limit("p_max_bar", [95.0]), "upper", "upper = .*: must be one number"),
         (lambda: ExtremumSeeking(start=0.0, period="x"), "period", "period = 'x': must be a whole number"),
         (lambda: ExtremumSeeking(start="x"), "start", "start = 'x': must be"),
+        (lambda: Spsa(start=0.0, seed=-1), "seed", "seed = -1: must be a whole number >= 0"),
+        (lambda: monte_carlo(VirtualEngine(), SEEKER, [1, -1], cycles=5), None, "-1.*must be"),
+        (
+            lambda: ExtremumSeeking(start=0.0, period=10**12),
+            "period",
+            "period = 1000000000000: must be a whole number up",
+        ),
+        (lambda: MapSeeking({"a": (0, 1)}, {"x": [0, 1]}, seed=-1), "seed", "seed = -1: must be a whole number >= 0"),
+        (lambda: MapSeeking({"a": (0, 1)}, {"x": [0, 1]}, kept=10**12), "kept", "kept = 1000000000000: must be"),
         (lambda: Spsa(start=0.0, limits=[3.0]), "limits", r"limits = \[3.0\], a list: must be a sequence of Limits"),
         (lambda: VirtualEngine([Cylinder()]), "cylinder", "cylinder = .*: must be a Cylinder"),
         (lambda: VirtualEngine(point=[OperatingPoint()]), None, "OperatingPoint"),

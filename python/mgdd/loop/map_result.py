@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, argument
 from mgdd.loop.lower_limits import plain_name
 from mgdd.maps import CalibrationMap
 from mgdd.maps.cells import MapTask
@@ -278,7 +278,16 @@ def _doubts(
     if seeker.doubts:
         text = f"readings were not explained by earlier ones, {seeker.doubts} times"
         out.append(Finding("unexplained", (), text, "look at what else changes; the newest readings count"))
-    return out
+    return [*out, *_start_above(seeker, visits[0])]
+
+
+def _start_above(seeker: MapSeeking, first: Visit) -> Iterator[Finding]:
+    for limit in seeker.settings["limits"]:
+        (name, side), value = plain_name(limit.name), first.limits[limit.name]
+        if value > limit.upper:
+            what = "above its" if side > 0.0 else "below its lower"
+            text = f"the first reading of {name}, {side * value:.6g}, is {what} limit, {side * limit.upper:.6g}"
+            yield Finding("start_above_limit", (name,), text, f"give {argument('start')} where it holds")
 
 
 def _where(axes: Mapping[str, Any], place: Any) -> str:

@@ -147,7 +147,12 @@ class VisitFile:
                     f"{self._path}: row {number} is at another point than this search would go to, {at}: it was "
                     "edited, or written by another version; give another file"
                 )
-            tell(seeker, visit)
+            try:
+                tell(seeker, visit)
+            except DataError as error:
+                raise DataError(
+                    f"{self._path}: row {number}: {error}; mend or delete it, or give another file"
+                ) from error
             yield visit
 
     def write(self, visit: Visit) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from mgdd.engine import Cylinder
 from mgdd.errors import Interrupted, ParameterError, argument, hinted
 from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.lower_limits import both_sides, measured_names, plain_name, with_lower_sides
+from mgdd.loop.lower_limits import both_sides, measured_names, middle_of, plain_name, safe_side, with_lower_sides
 from mgdd.loop.map_result import MapSearch, Visit
 from mgdd.loop.map_visits import Dwell, VisitFile, dwell_of, tell, visited
 from mgdd.loop.plant import Plant
@@ -104,7 +104,8 @@ def seek_map(
     limit_guides : mapping of str to guides, optional
         The same of the limits, where `guide` is not a cylinder.
     start : mapping of str to float, optional
-        First inputs, where the limits hold in the middle of the map, without a guide.
+        First inputs, where the limits hold in the middle of the map, without a guide. Left out, the middle of the
+        bounds, and of a timing the bound where limits like those hold best.
     visits : int
         How many at most, those of a `seeker` or a record included.
     tolerance : float, optional
@@ -182,9 +183,12 @@ def seek_map(
         if isinstance(driven, VirtualTestBed) and _is_engine(guide):
             cylinder = cylinder_of(getattr(guide, "cylinder", guide))
             guide, limit_guides = model_of(driven, cylinder, entries, sought, [limit.name for limit in sides])
+        begin = started(start, sought)
+        if begin is None and guide is None:
+            begin = middle_of(sought) | safe_side(sought, sides)
         seeker = map_seeker(
-            inputs, entries, dwell, settings or {}, limits=sides, guide=guide, limit_guides=limit_guides,
-            start=started(start, sought), smoothness=smoothness, maximize=maximize, seed=seed,
+            inputs, entries, dwell, settings or {}, limits=sides, guide=guide, limit_guides=limit_guides, start=begin,
+            smoothness=smoothness, maximize=maximize, seed=seed,
         )  # fmt: skip
     return _searched(with_lower_sides(driven, sides), seeker, dwell, before, visits, tolerance, record, on_visit)
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mgdd._core.optimize import Input
 
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7}  # of a guide, per input
+_OWN_NAMES = ("j", "j_sd", "regret", "excess", "limit", "holds", "readings", "failed")  # of cells and records
 _REFUSED = ("J is not one number", "wrong number of limits", "a number that is not a reading: finite, within 1e30")
 
 
@@ -153,8 +154,11 @@ class MapSeeking(_core.optimize.MapSeeking):
             if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
                 raise ParameterError(f"inputs: {one.name} = ({one.lower:g}, {one.upper:g}): give finite bounds")
         kept = limits_of(limits)
+        _require_apart(list(entries), names, [one.name for one in kept])
         over = {**entries, **input_nodes(sought)}
         given: dict[str, Any] = {}
+        for which, one in {"guide": guide, **(limit_guides if isinstance(limit_guides, Mapping) else {})}.items():
+            _require_over_inputs(which, one, names)
         if guide is not None:
             given["guide"] = [surface_of(guide, list(over), list(over.values()), argument="guide")]
         elif limit_guides:
@@ -381,6 +385,27 @@ def entries_of(axes: Any, inputs: Sequence[str]) -> dict[str, np.ndarray[Any, np
     if twice := [name for name in inputs if name in out]:
         raise ParameterError(f"{argument('inputs')}: {', '.join(twice)} is an axis too: name it in one of them")
     return out
+
+
+def _require_apart(axes: Sequence[str], inputs: Sequence[str], limits: Sequence[str]) -> None:
+    """Refuse names by which the map says something else."""
+    own = {*_OWN_NAMES, *(f"{name}_sd" for name in inputs)}
+    for what, names, others in (("axes", axes, ()), ("inputs", inputs, ()), ("limits", limits, [*axes, *inputs])):
+        for name in names:
+            if name in own or name in others:
+                meant = "an axis or an input" if name in others else "a number of every cell or visit"
+                raise ParameterError.of(f"{argument(what)}: name", name, f"another one: {meant} is called so")
+
+
+def _require_over_inputs(name: str, guide: Any, inputs: Sequence[str]) -> None:
+    """Refuse a map over operating points alone: of every input it says the same."""
+    axes = getattr(guide, "axes", None)
+    if isinstance(axes, Mapping) and not set(axes) & set(inputs):
+        raise ParameterError.of(
+            name, guide,
+            f"a model over {', '.join(inputs)} too, and this map says where the best input lies: give the model that "
+            "it was made with, or go on from its search with seeker=",
+        )  # fmt: skip
 
 
 def _limit_guides(given: Any, limits: Sequence[str], over: Mapping[str, Any]) -> list[Any]:

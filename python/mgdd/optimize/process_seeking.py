@@ -28,12 +28,6 @@ def surface_of(guide: Any, names: Sequence[str], axes: Sequence[NDArray[np.float
         return guide
     if hasattr(guide, "dims") and hasattr(guide, "coords"):
         return _of_map(guide, names, argument)
-    if hasattr(guide, "cells") and hasattr(guide, "provenance"):  # a CalibrationMap can be called, too
-        raise ParameterError.of(
-            argument, guide,
-            "a model of the objective or a limit, and this map says where the best input lies: give the model that it "
-            "was made with, or go on from its search with seeker=",
-        )  # fmt: skip
     if len(axes) not in _NODES:
         raise ShapeError(f"{argument}: a guide is over one to five inputs, and there are {len(axes)}: leave it out")
     if not all(np.isfinite(axis).all() for axis in axes):

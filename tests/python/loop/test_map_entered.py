@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError
-from mgdd.loop import seek_map
+from mgdd.loop import VirtualEngine, seek_map
+from mgdd.maps import CalibrationMap
 from mgdd.optimize import MapSeeking
 
 SOC = {"soc": (-20.0, 10.0)}
@@ -112,6 +113,10 @@ def test_a_map_is_no_model_and_a_search_that_goes_on_heeds_its_own_terms() -> No
     found = seek_map(engine, SOC, SPEEDS, visits=6)
     with pytest.raises(ParameterError, match="this map says where the best input lies"):
         seek_map(engine, SOC, SPEEDS, visits=6, guide=found.map)
+    surface = CalibrationMap(
+        {"rpm": [1000.0, 3000.0], "soc": [-20.0, -3.0, 10.0]}, [[-289.0, 0.0, -169.0]] * 2, name="efficiency_percent"
+    )
+    assert seek_map(engine, SOC, SPEEDS, visits=6, guide=surface).seeker.trust > 0.5  # over the input it is J
     for name, value in (("limits", {"p": 1.0}), ("guide", engine), ("start", {"soc": 0.0}), ("settings", {"kept": 50})):
         with pytest.raises(ParameterError, match=f"{name} .*left out beside seeker"):
             seek_map(engine, SOC, SPEEDS, visits=8, seeker=found, **{name: value})
@@ -127,3 +132,43 @@ def test_a_map_is_no_model_and_a_search_that_goes_on_heeds_its_own_terms() -> No
     with pytest.raises(ParameterError, match=r"axes .*those of the seeker"):
         seek_map(engine, SOC, {"rpm": [1000, 2000]}, visits=8, seeker=found)
     assert len(seek_map(engine, SOC, SPEEDS, visits=8, seeker=found).visits) == 8
+
+
+@pytest.mark.parametrize(
+    ("inputs", "axes", "limits", "text"),
+    [
+        (SOC, {"j": [0.0, 1.0]}, (), "axes: name = 'j': must be another one: a number of every cell"),
+        ({"regret": (0.0, 1.0)}, SPEEDS, (), "inputs: name = 'regret'"),
+        (SOC, {"soc_sd": [0.0, 1.0]}, (), "axes: name = 'soc_sd'"),
+        (SOC, SPEEDS, {"rpm": 1.0}, "limits: name = 'rpm': must be another one: an axis or an input"),
+        (SOC, SPEEDS, {"soc": 1.0}, "limits: name = 'soc'"),
+        (SOC, SPEEDS, {"j_sd": 1.0}, "limits: name = 'j_sd'"),
+    ],
+)
+def test_a_name_that_the_map_has_is_refused(inputs: Any, axes: Any, limits: Any, text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        MapSeeking(inputs, axes, limits=limits)
+
+
+def test_a_search_without_a_start_begins_where_the_limits_hold_and_one_above_them_says_so() -> None:
+    axes, limits = {"speed_rpm": [1000, 2000], "fuel_mg": [12, 24]}, {"p_max_bar": 110.0, "dp_max_bar_per_cad": 5.0}
+    found, early = (
+        seek_map(VirtualEngine("puma_single", seed=4), {"soc_cad": (-30.0, 10.0)}, axes, limits=limits, start=start,
+                 visits=12)
+        for start in (None, {"soc_cad": -14.0})
+    )  # fmt: skip
+    assert found.visits[0].inputs["soc_cad"] == 10.0
+    assert all(visit.limits[name] <= 1.01 * most for visit in found.visits for name, most in limits.items())
+    assert "start_above_limit" not in [finding.code for finding in found.findings]
+    (told,) = (
+        finding for finding in early.findings if finding.code == "start_above_limit" and finding.names == ("p_max_bar",)
+    )
+    assert "the first reading of p_max_bar, 1" in str(told)
+    assert "above its limit, 110" in str(told)
+    lower = seek_map(
+        lambda x: (-(x["x"] ** 2), {"y": x["x"]}), {"x": (-1.0, 1.0)}, {"rpm": [1.0, 2.0]}, visits=4,
+        start={"x": 0.1}, limits={"y": (0.2, None)},
+    )  # fmt: skip
+    assert any(
+        str(one).startswith("the first reading of y, 0.1, is below its lower limit, 0.2;") for one in lower.findings
+    )

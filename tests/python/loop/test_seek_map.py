@@ -145,7 +145,12 @@ def test_a_record_goes_on_as_if_it_had_never_stopped(tmp_path: Path) -> None:
         with pytest.raises(DataError, match="another search"):
             seek_map(SparkEngine(3), SPARK, AXES, visits=12, record=file, **{**GUIDED, "seed": 3, **other})
     rows = file.read_text(encoding="utf-8").splitlines()
-    for edited, what in (("9" + rows[4][1:], "another point"), (rows[4] + ",1.0", "must be 9 numbers")):
+    unread = rows[4].split(",")
+    unread[rows[1].split(",").index("j")] = "nan"
+    for edited, what in (
+        ("9" + rows[4][1:], "another point"), (rows[4] + ",1.0", "must be 9 numbers"),
+        (",".join(unread), "row 3: J = nan: must be finite.*mend or delete it"),
+    ):  # fmt: skip
         file.write_text("\n".join([*rows[:4], edited, ""]), encoding="utf-8")
         with pytest.raises(DataError, match=what):
             seek_map(SparkEngine(3), SPARK, AXES, visits=12, record=file, seed=3, **GUIDED)
