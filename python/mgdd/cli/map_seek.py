@@ -62,6 +62,7 @@ def _add_seek(parser: Any) -> None:
     option(parser, "--drive FILE.csv",
            "then drive the engine through the points of the file, a row each: the axes, and cycles; the map goes on "
            "learning in every one of them")  # fmt: skip
+    option(parser, "--search FILE.json", "write the search too: mgdd engine seek --map drives an engine by it")
     option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
     parser.add_argument("--live", action="store_true", help="draw --figure anew after every visit, to be watched")
     add_bench(parser, "none", "soft")
@@ -73,6 +74,7 @@ def _add_seek(parser: Any) -> None:
 
 def _seek(args: argparse.Namespace) -> None:
     check_file("--record", args.record, (".csv",))
+    check_file("--search", args.search, (".json",))
     limits, axes, start = limits_given(args.limit), grid_of(args.over), number_pairs(args.start, "--start")
     if args.guide == "none":
         refuse_idle(args, "guide_preset", "guide_set", why="--guide none has no model: give --guide model")
@@ -98,7 +100,7 @@ def _seek(args: argparse.Namespace) -> None:
                 **_SEARCH.given(args), **_SETTLING.given(args),
             )  # fmt: skip
             if drive is not None:
-                found, driven = _driven(found, *drive, bounds, limits)
+                found, driven = _driven(found, *drive)
                 interrupted = driven.run.interrupted
         except Interrupted as stop:
             if not isinstance(stop.partial, MapSearch):
@@ -106,6 +108,8 @@ def _seek(args: argparse.Namespace) -> None:
             found, interrupted = stop.partial, True
             if not found.visits:
                 raise Stopped("interrupted before the first visit was finished: nothing to keep") from stop
+    if args.search is not None:
+        found.seeker.save(args.search)
     warn(*found.findings)
     maps = list(found.maps.values())
     payload = found.to_dict() | {"interrupted": interrupted, "preset": preset, "sensor": args.sensor}
@@ -139,13 +143,11 @@ def _drive_of(file: str, axes: list[str], bench: VirtualEngine) -> tuple[Virtual
         raise ParameterError(f"--drive {file}: {error}") from error
 
 
-def _driven(
-    found: MapSearch, engine: VirtualEngine, cycles: int, bounds: Any, limits: Any
-) -> tuple[MapSearch, SeekResult]:
+def _driven(found: MapSearch, engine: VirtualEngine, cycles: int) -> tuple[MapSearch, SeekResult]:
     """Drive an engine by the map, which learns in every cycle; Ctrl-C ends the drive, and the map stays."""
     driver = found.seeker.driver()
     try:
-        run = seek(engine, bounds, seeker=driver, limits=limits, cycles=cycles)
+        run = seek(engine, seeker=driver, cycles=cycles)
     except Interrupted as stop:
         if not isinstance(stop.partial, SeekResult):
             raise

@@ -15,7 +15,7 @@ from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
-from mgdd.cli.options import add_engine, engine_of, option
+from mgdd.cli.options import add_engine, engine_of, option, refuse_idle
 from mgdd.cli.output import emit, lines, warn
 from mgdd.cli.progress import Stopped
 from mgdd.cli.ranges import assignments, bounds_of, limits_given, number_pairs
@@ -24,11 +24,12 @@ from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
 from mgdd.io.point_table import read_points
 from mgdd.loop import VirtualEngine, seek
-from mgdd.loop.lower_limits import plain_name
+from mgdd.loop.lower_limits import limits_by_name, plain_name
 from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
 from mgdd.loop.summary import FIGURES, NOISE_FREE
-from mgdd.optimize import ComponentLag
+from mgdd.optimize import ComponentLag, MapSeeking
+from mgdd.optimize.map_driver import MapDriver
 from mgdd.optimize.optimum import Optimum
 from mgdd.plot import seeking
 from mgdd.plot.style import drawn
@@ -69,6 +70,9 @@ def _add_seek(parser: Any) -> None:
            f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X, or with NAME=LOW:HIGH between two, of "
            "which one may be left out; repeatable")  # fmt: skip
     option(parser, "--known FILE.csv", "readings of before, as -o writes them: they are told to the seeker first")
+    option(parser, "--map FILE.json",
+           "seek by what mgdd map seek --search has written, which learns on in every cycle and is written back",
+    )  # fmt: skip
     option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
     add_bench(parser, "none", "analyser", "soft")
     add_guide(parser)
@@ -86,7 +90,9 @@ def add_bench(parser: Any, *sensors: str) -> None:
 
 def _seek(args: argparse.Namespace) -> None:
     check_guide(args)
-    limits, start = limits_given(args.limit), number_pairs(args.start, "--start")
+    driver = None if args.map is None else _driver(args)
+    limits = limits_given(args.limit) if driver is None else limits_by_name(driver.search.settings["limits"])
+    start = number_pairs(args.start, "--start")
     known = None if args.known is None else read_points(args.known)
     with option_names(_NAMES):
         bench, bounds, preset = bench_of(args, limits)
@@ -97,15 +103,18 @@ def _seek(args: argparse.Namespace) -> None:
         )
         try:
             found: SeekResult = seek(
-                bench, bounds, seeker=args.seeker, start=start or None, limits=limits,
+                bench, bounds, seeker=driver or args.seeker, start=start or None, limits=limits,
                 tolerance=number_pairs(args.tolerance, "--tolerance") or None, components=_lags(bench),
-                guide=guide, known=known, settings=assignments(args.seeker_set, {}, "--seeker-set"), seed=bench.seed,
+                guide=guide, known=known, settings=assignments(args.seeker_set, {}, "--seeker-set"),
+                seed=0 if driver is not None else bench.seed,
                 **_SEARCH.given(args),
             )  # fmt: skip
         except Interrupted as stop:
             if not isinstance(stop.partial, SeekResult):
                 raise
             found = stop.partial
+    if driver is not None:
+        driver.search.save(args.map)
     run, timing = found.run, guide if isinstance(guide, TimingMap) else None
     learnt, unlearnt = learn_map(args, timing, found.seeker, bench.point, interrupted=run.interrupted)
     doubts = [*map(str, found.findings), *unlearnt]
@@ -117,6 +126,21 @@ def _seek(args: argparse.Namespace) -> None:
     emit(args, payload, text=_text(payload, found), traces=_table(run.dataset), figure=picture)
     if run.interrupted:
         raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
+
+
+def _driver(args: argparse.Namespace) -> MapDriver:
+    """Read the map that is driven by, whose inputs become those of the bench."""
+    why = "the search of --map has its own"
+    refuse_idle(args, "input", "limit", "start", "seeker_set", "known", "tolerance", "noise_sd", why=why)
+    for name, default in (("seeker", "auto"), ("guide", "none"), ("sensor", "none")):
+        if getattr(args, name) not in (None, default):
+            raise ParameterError(f"--{name} does not act here; {why}")
+    search = MapSeeking.load(args.map)
+    args.input = [
+        f"{one.name}={one.lower!r}:{one.upper!r}" + (f":{one.step!r}" if one.step > 0.0 else "")
+        for one in search.settings["inputs"]
+    ]
+    return search.driver()
 
 
 def bench_of(

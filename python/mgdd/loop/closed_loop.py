@@ -11,21 +11,27 @@ from numpy.typing import NDArray
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, argument
 from mgdd.guide import FeedForward, GuidedEngine
+from mgdd.loop.lower_limits import with_lower_sides
 from mgdd.loop.plant import Plant
-from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
+from mgdd.loop.plant_loop import LoopRun, OwnSeeker, require_inputs_of, steer
 from mgdd.loop.plant_record import VOID, cycles_to_dataset, steered
 from mgdd.loop.seek_choice import Question
 from mgdd.loop.summary import NOISE_FREE, LoopCriteria, limit_figures, of_first_input, summarize_cycles, with_a_limit
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import named_values
+from mgdd.optimize.map_driver import MapDriver
 from mgdd.optimize.seeker_findings import findings_of
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.result import Figures
 
 
 def run_seeker(
-    plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, *, criteria: LoopCriteria | None = None
+    plant: Plant,
+    seeker: Seeker | FeedForward | GuidedEngine | MapDriver,
+    cycles: int,
+    *,
+    criteria: LoopCriteria | None = None,
 ) -> LoopRun:
     """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
 
@@ -42,9 +48,9 @@ def run_seeker(
     plant : Plant
         It advances by ``cycles``; a rig is open and stays open.
     seeker
-        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, in their
-        order or, where it has ``inputs``, by their names; one component or as many as the plant measures, and limits
-        that the plant measures.
+        Any seeker of `mgdd.optimize` or `mgdd.guide`, or ``driver()`` of a `MapSeeking`, with one input for every name
+        of ``plant.input_names``, in their order or, where it has ``inputs``, by their names; one component or as many
+        as the plant measures, and limits that the plant measures.
     cycles : int
         How many, >= 1.
     criteria : LoopCriteria, optional
@@ -78,6 +84,9 @@ def run_seeker(
     True
     """
     criteria = criteria or LoopCriteria()
+    if isinstance(seeker, MapDriver):
+        driver: Any = OwnSeeker.of_driver(seeker)
+        return steer(with_lower_sides(plant, driver.settings["limits"]), driver, cycles, criteria)
     if (
         not isinstance(plant, VirtualEngine)
         or len(plant.input_names) > 1

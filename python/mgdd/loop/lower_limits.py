@@ -36,6 +36,17 @@ def both_sides(limits: Any) -> tuple[Limit, ...]:
     return limits_of(sides)
 
 
+def limits_by_name(limits: Sequence[Limit]) -> dict[str, tuple[float | None, float | None]]:
+    """Give the pairs (lower, upper) that `both_sides` makes these of, margins taken off."""
+    pairs = dict[str, tuple[float | None, float | None]]()
+    for limit in limits:
+        name, side = plain_name(limit.name)
+        low, high = pairs.get(name, (None, None))
+        bound = side * (limit.upper - limit.margin)
+        pairs[name] = (low, bound) if side > 0.0 else (bound, high)
+    return pairs
+
+
 def plain_name(name: str) -> tuple[str, float]:
     """Give the quantity of a limit, and the sign by which it was taken."""
     return (name[1:], -1.0) if name.startswith(_LOWER) else (name, 1.0)

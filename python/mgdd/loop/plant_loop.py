@@ -19,6 +19,7 @@ from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.plant_record import Cycles, Row, cycles_given, dataset_of
 from mgdd.loop.summary import LoopCriteria, summarize_cycles
 from mgdd.optimize import Seeker
+from mgdd.optimize.map_driver import MapDriver
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.finding import Finding
 from mgdd.results.labels import label_of
@@ -51,6 +52,12 @@ class OwnSeeker:
 
     def __repr__(self) -> str:
         return f"<{self.kind} cycle {self.cycle}, estimate {self.estimate}>"
+
+    @classmethod
+    def of_driver(cls, driver: MapDriver) -> OwnSeeker:
+        """Hold the driver of a map, whose search has inputs, limits and sense."""
+        own = driver.search.settings
+        return cls(driver, own["inputs"], own["limits"], maximize=own["maximize"])
 
     @staticmethod
     def is_one(seeker: Any) -> bool:

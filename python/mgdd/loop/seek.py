@@ -22,6 +22,7 @@ from mgdd.loop.seek_result import SeekResult, found_by
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.optimize import ComponentLag, GaussianProcessSeeking, Input, Limit, Seeker
 from mgdd.optimize.inputs import inputs_of, named_values
+from mgdd.optimize.map_driver import MapDriver
 from mgdd.presets.meant import cylinder_of
 
 _MOST_CYCLES = 2_000_000
@@ -136,7 +137,12 @@ def seek(
     sides = both_sides(limits)
     own = Seeker | FeedForward | GuidedEngine | OwnSeeker
     if not isinstance(seeker, own) and OwnSeeker.is_one(seeker):
-        seeker = OwnSeeker(seeker, seek_inputs(inputs), sides, maximize=maximize)
+        if hasattr(seeker, "at") and hasattr(plant, "point"):
+            seeker.at(plant.point)  # its estimate is of an operating point
+        if isinstance(seeker, MapDriver):
+            seeker = OwnSeeker.of_driver(seeker)
+        else:
+            seeker = OwnSeeker(seeker, seek_inputs(inputs), sides, maximize=maximize)
     if isinstance(seeker, own):
         left_out = {
             "start": start is None, "noise_sd": noise_sd is None, "delay_cycles": not delay_cycles,

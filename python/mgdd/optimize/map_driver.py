@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class MapDriver:
-    """A search for a map as the seeker of a driven engine: ``seek(engine, inputs, seeker=search.driver())``.
+    """A search for a map as the seeker of a driven engine: ``seek(engine, seeker=search.driver())``.
 
     At each operating point it asks for what is worth most there, and what is read teaches the whole map. Outside of the
     axes the nearest point is asked for and nothing is learnt.

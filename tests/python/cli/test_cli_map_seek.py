@@ -17,6 +17,7 @@ import pytest
 from mgdd.cli import main, map_seek
 from mgdd.loop import VirtualEngine
 from mgdd.maps import read_map
+from mgdd.optimize import MapSeeking
 from typed import Capsys, commands
 
 seek, refused = commands("map", "seek")
@@ -76,6 +77,23 @@ def test_an_engine_is_driven_and_the_map_learns_on(
     learnt = read_map(Path("map.nc"))
     assert learnt.provenance["driven"] == "35 cycles"
     assert np.argwhere(learnt.cells["source"] == "learned").tolist() == [[0, 0], [2, 1]]
+
+
+def test_a_search_that_is_written_drives_another_engine_and_is_written_back(tmp_path: Path, capsys: Capsys) -> None:
+    file, steps = tmp_path / "search.json", ("--input", "soc_cad=-25:8:0.5", "--limit", "p_max_bar=40:115")
+    seek(capsys, *AXES, *MODEL[:4], *steps, "--visits", "8", "--averaged", "20", "--search", str(file))
+    drive = ["engine", "seek", "--map", str(file), "--speed-rpm", "1500", "--fuel-mg", "16", "--cycles", "25", "--json"]
+    for readings in (33, 58):
+        assert main([*drive, "--seed", str(readings)]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["start"]["soc_cad"] == pytest.approx(found["inputs"]["soc_cad"], abs=2.0)
+        assert abs(found["j_lost"]) < 0.1  # percent
+        assert MapSeeking.load(file).readings == readings
+    for idle in (["--limit", "p_max_bar=100"], ["--input", "egr=0:0.3"], ["--guide", "curve"], ["--seeker", "spsa"]):
+        assert main([*drive, *idle]) == 2
+        assert f"{idle[0]} does not act here; the search of --map has its own" in capsys.readouterr().err
+    assert main([*drive[:3], str(tmp_path / "none.json")]) == 2
+    assert MapSeeking.load(file).readings == 58
 
 
 def test_a_drive_that_is_stopped_keeps_the_map(tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:

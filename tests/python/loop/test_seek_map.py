@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import itertools
 import math
@@ -14,7 +15,7 @@ import pytest
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
-from mgdd.loop import VirtualEngine, VirtualTestBed, seek, seek_map
+from mgdd.loop import VirtualEngine, VirtualTestBed, run_seeker, seek, seek_map
 from mgdd.maps import CalibrationMap
 from mgdd.optimize import MapSeeking
 
@@ -209,7 +210,13 @@ def test_the_virtual_engine_is_driven_over_its_map() -> None:
     drive = VirtualEngine("puma_single", schedule=schedule, limits=["p_max_bar"], seed=8)
     before = found.seeker.readings
     driver = found.seeker.driver()
-    run = seek(drive, {"soc_cad": (-20.0, 8.0)}, seeker=driver, limits=limits, cycles=120)
+    alone = copy.deepcopy(found.seeker).driver()
+    plain = run_seeker(VirtualEngine("puma_single", schedule=schedule, limits=["p_max_bar"], seed=8), alone, 120)
+    run = seek(drive, seeker=driver, cycles=120)
+    assert run.run.dataset["applied"].identical(plain.dataset["applied"])
+    assert run.start["soc_cad"] == pytest.approx(float(found.map({"speed_rpm": 1200.0, "fuel_mg": 14.0})), abs=1.0)
+    with pytest.raises(ParameterError, match="leave them out"):
+        seek(drive, {"soc_cad": (-20.0, 10.0)}, seeker=driver, cycles=5)
     assert found.seeker.readings == before + 120
     assert found.seeker.doubts == 0  # single cycles scatter as those of the visits did
     scatter = found.dataset["visit_p_max_bar_sd"]

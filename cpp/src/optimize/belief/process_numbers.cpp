@@ -17,7 +17,8 @@ namespace {
 constexpr double noise_prior = -5.3, noise_prior_sd = 1.5;
 constexpr double rest_prior_sd = 1.5;
 constexpr double length_prior = -0.7, length_prior_sd = 0.7;
-constexpr double settled_sd = 0.4;  // of the bend, once the first readings have shown it
+constexpr double expected_sd = 1.0;  // of a bend, by itself or of a guide: two readings alike are no plane
+constexpr double settled_sd = 0.4;   // of the bend, once the first readings have shown it
 constexpr double bend_search_sd = 1.5;
 constexpr double factor_width = 0.5;  // of what the guide counts by: heavy tails
 constexpr double useless_factor = -6.0;
@@ -141,7 +142,10 @@ double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const n
     const double factor = numbers[numbers.size() - 1] / factor_width;
     out += log_prior(numbers[0] - whole, settings_.missed, settings_.missed_sd) - std::log1p(factor * factor);
   }
-  if (settings_.bend && !kernel_.guided()) out += log_prior(numbers[0], std::log(*settings_.bend), 1.0);
+  if (settings_.bend) {
+    out += kernel_.guided() ? log_prior(whole, std::log(kernel_.guide_bend()), expected_sd)
+                            : log_prior(numbers[0], std::log(*settings_.bend), expected_sd);
+  }
   if (settled_bend_) out += log_prior(numbers[0], *settled_bend_, settled_sd);
   return out;
 }

@@ -61,8 +61,11 @@ double Surface::read(const Inputs& at, Inputs& slopes) const noexcept {
   // value and of every slope.
   constexpr std::size_t most = 1024;
   static_assert(most_inputs == 5);  // of four nodes each
+  // Written before they are read: to fill 18 KB first would cost as much as the reading.
+  // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init)
   std::array<double, most> value;
   std::array<std::array<double, most / 4>, most_inputs> slope;  // per axis
+  // NOLINTEND(cppcoreguidelines-pro-type-member-init)
   std::size_t left = 0;
   for (bool more = true; more;) {
     for (std::size_t k = 0; k < on[n - 1].count; ++k)

@@ -13,16 +13,14 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr int search_rounds = 6, search_points = 12;
-constexpr double search_width = 0.08, search_shrinks = 0.45;
-constexpr double growth = 0.4;           // beyond what has been explored, in widths of that
-constexpr double guided_reach = 0.2;     // beyond it at least where there is a guide, in ranges
-constexpr std::int64_t resting = 40;     // inputs at the estimate, then the search is over
-constexpr double turned = -0.7;          // what a first step is multiplied by after a failure
-constexpr std::int64_t most_turns = 6;   // for them; then inputs that cannot move are left alone
-constexpr double along_edges = 4.0;      // sd of J that reading it along limits is worth
-constexpr double along_readings = 10.0;  // of the fewest, until it is worth that: early sd promise too much
-constexpr double along_cycles = 100.0;   // without a doubt, then it is worth less and less
+constexpr double growth = 0.4;          // beyond what has been explored, in widths of that
+constexpr double guided_reach = 0.2;    // beyond it at least where there is a guide, in ranges
+constexpr std::int64_t resting = 40;    // inputs at the estimate, then the search is over
+constexpr double turned = -0.7;         // what a first step is multiplied by after a failure
+constexpr std::int64_t most_turns = 6;  // for them; then inputs that cannot move are left alone
+constexpr double along_edges = 8.0;     // sd of J that reading it along limits is worth; 4 stop at corners
+constexpr double along_readings = 2.0;  // of the fewest, until it is worth that: early sd promise too much
+constexpr double along_cycles = 50.0;   // without a doubt, then it is worth less and less
 
 }  // namespace
 
@@ -58,9 +56,7 @@ void GaussianProcessSeeking::choose() noexcept {
   if (!read || !(guided() || (star_ >= n && to_every_side))) return choose_first();
   const Inputs about = since_failure_ > 0 ? scaled(estimate_) : good_;
   fit(about);
-  know_edge(about);
   const Inputs best = best_of_mean(about);
-  know_edge(best);
   estimate_ = unscaled(best);
   const double aside = dither();
   candidates_.row(0) = best.transpose();
@@ -197,39 +193,6 @@ void GaussianProcessSeeking::send(const Inputs& z) noexcept {
     own = std::clamp(own, -rate, rate);
   }
   applied_ = (before + step).cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
-}
-
-// The best safe mean around a point, by ever narrower clouds; where nothing is safe, the least mean excess.
-Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
-  const Eigen::Index n = from.size();
-  Inputs best = reachable(from);
-  double best_mean = 0.0, best_excess = 0.0;
-  bool first = true, safe = false;
-  double width = search_width;
-  for (int round = 0; round < search_rounds; ++round, width *= search_shrinks) {
-    candidates_.row(0) = best.transpose();
-    for (int p = 1; p <= search_points; ++p) {
-      Inputs z = best;
-      for (Eigen::Index i = 0; i < n; ++i)
-        z[i] += width * draw(200 + static_cast<std::uint64_t>(round), p * max_inputs + static_cast<int>(i));
-      candidates_.row(p) = reachable(z).transpose();
-    }
-    keep_safe(search_points + 1, quantile_);
-    for (ProcessModel& model : j_)
-      model.predict_means(candidates_, search_points + 1);
-    for (int p = first ? 0 : 1; p <= search_points; ++p) {
-      const auto at = static_cast<std::size_t>(p);
-      const bool own_safe = over_[at] <= 0.0;
-      const bool better = own_safe != safe ? own_safe : safe ? mean(p) > best_mean : mean_over_[at] < best_excess;
-      if (!first && !better) continue;
-      first = false;
-      safe = own_safe;
-      best_excess = mean_over_[at];
-      best_mean = mean(p);
-      best = candidates_.row(p).transpose();
-    }
-  }
-  return best;
 }
 
 // After the estimate and what is to the side of it a few from everywhere, then a cloud around it, at distances of all

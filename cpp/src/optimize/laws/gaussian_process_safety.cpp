@@ -1,4 +1,4 @@
-// Where a seeker by Gaussian processes may ask: inside its limits, and where cycles work.
+// Where a seeker by Gaussian processes may ask: inside its limits, and where cycles work; and the best input there.
 #include <algorithm>
 #include <cmath>
 
@@ -13,9 +13,11 @@ constexpr FailingProcess::Demand not_failing{2.0, 0.0, 0.8}, wary_of_failing{2.0
 constexpr double rise_of_limit = 1.2;  // scales per range: sd of its slope before readings, 0.4 of 3 bends
 constexpr double rises_in_room = 2.0, least_step = 0.25;  // sd that a first step leaves room for; of the whole step
 
+constexpr int search_points = 12;  // of the cloud that the search for the best begins with
+constexpr double search_width = 0.08;
+
 constexpr int pull_rounds = 2, pull_sweeps = 4;  // the process bends, and limits meet
 constexpr double farthest_pull = 0.3;            // in ranges, as far as slopes at the estimate may say
-constexpr double at_bound = 1e-3;                // ranges
 constexpr double inside_edge = 1e-3;             // scales of a limit, so that rounding leaves it kept
 
 }  // namespace
@@ -51,7 +53,7 @@ void GaussianProcessSeeking::judge_safety(int points, double quantile) noexcept 
     for (int p = 0; p < points; ++p) {
       const auto at = static_cast<std::size_t>(p);
       const double likely = limited_[i].excess(p, quantile), mean = limited_[i].excess(p, 0.0);
-      excess_[i * candidates + at] = likely;
+      excess_(static_cast<Eigen::Index>(i), p) = likely;
       credit_[at] += multipliers_[i] * (likely - mean);
       judge(likely, mean, p);
     }
@@ -75,7 +77,7 @@ bool GaussianProcessSeeking::pull_back(int points) noexcept {
     for (int sweep = 0; sweep < pull_sweeps; ++sweep) {
       for (std::size_t i = 0; i < limited_.size(); ++i) {
         const auto edge = edges_.row(static_cast<Eigen::Index>(i));
-        const double off = excess_[i * candidates + static_cast<std::size_t>(p)] + edge.dot(step) + inside_edge;
+        const double off = excess_(static_cast<Eigen::Index>(i), p) + edge.dot(step) + inside_edge;
         const double steep = edge.squaredNorm();
         if (off > inside_edge * 0.5 && steep > 0.0) step -= off / steep * edge.transpose();
       }
@@ -89,47 +91,62 @@ bool GaussianProcessSeeking::pull_back(int points) noexcept {
   return moved;
 }
 
-// Slopes of the limits at a point, and what J would gain there by each that holds it back, were it wider.
-void GaussianProcessSeeking::know_edge(const Inputs& at) noexcept {
-  if (limited_.empty()) return;
-  const Eigen::Index n = at.size();
-  const int points = 1 + 2 * static_cast<int>(n);
-  candidates_.topRows(points) = at.transpose().replicate(points, 1);
-  Inputs apart(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    candidates_(1 + 2 * k, k) = std::min(1.0, at[k] + slope_step);
-    candidates_(2 + 2 * k, k) = std::max(0.0, at[k] - slope_step);
-    apart[k] = candidates_(1 + 2 * k, k) - candidates_(2 + 2 * k, k);
-  }
-  const auto slopes = [&](const ProcessModel& model, auto&& out, double scale) {
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const int up = 1 + 2 * static_cast<int>(k);
-      out[k] += (model.mean(up) - model.mean(up + 1)) / (apart[k] * scale);
-    }
+// The best input around a point that keeps the limits: of a cloud there, then uphill along them. Where none does, the
+// one that breaks them least.
+Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
+  const Eigen::Index n = from.size(), limits = edges_.rows();
+  const auto take = [&](int points) {
+    judge_safety(points, quantile_);
+    for (ProcessModel& model : j_)
+      model.predict_means(candidates_, points);
   };
-  Inputs rest = Inputs::Zero(n);
-  for (ProcessModel& model : j_) {
-    model.predict_means(candidates_, points);
-    slopes(model, rest, 1.0);
+  const auto at = [&](int p) { return Climb::Worth{over_[static_cast<std::size_t>(p)], mean(p)}; };
+  const auto consider = [&](int points) {
+    for (int p = 0; p < points; ++p)
+      climb_.consider(candidates_.row(p).transpose(), at(p));
+  };
+  const auto over_at = [&](int p) {
+    for (Eigen::Index i = 0; i < limits; ++i)
+      edge_over_[static_cast<std::size_t>(i)] = excess_(i, p) + Climb::inside;
+    return std::span(edge_over_);
+  };
+  candidates_.row(0) = reachable(from).transpose();
+  for (int p = 1; p <= search_points; ++p) {
+    Inputs z = from;
+    for (Eigen::Index i = 0; i < n; ++i)
+      z[i] += search_width * draw(200, p * max_inputs + static_cast<int>(i));
+    candidates_.row(p) = reachable(z).transpose();
   }
-  std::fill(multipliers_.begin(), multipliers_.end(), 0.0);
-  edges_.setZero();
-  judge_safety(points, quantile_);
-  Inputs low = Inputs::Constant(n, -unlimited), high = -low;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    if (at[k] < at_bound) low[k] = 0.0;
-    if (at[k] > 1.0 - at_bound) high[k] = 0.0;
+  take(search_points + 1);
+  climb_.begin(candidates_.row(0).transpose(), at(0));
+  consider(search_points + 1);
+  for (int round = 0; round < Climb::rounds; ++round) {
+    const int star = climb_.star();
+    for (int p = 0; p < star; ++p)
+      candidates_.row(p) = climb_.beside(p, aside_).transpose();
+    take(star);
+    for (Eigen::Index i = 0; i < limits; ++i)
+      climb_.slopes(aside_, [&](int k) { return excess_(i, k); }, edges_.row(i));
+    climb_.renew(at(0));
+    climb_.aim(aside_, [&](int k) { return mean(k); }, edges_, over_at(0), nearest_);
+    for (std::size_t i = 0; i < limited_.size(); ++i)
+      multipliers_[i] = nearest_.multiplier(i);
+    for (int p = 1; protocol_.steps.any() && p < star; ++p) {
+      const Inputs z = candidates_.row(p).transpose();
+      if (reachable(z) == z) climb_.consider(z, at(p));
+    }
+    for (const bool back : {false, true}) {
+      for (int k = 0; k < Climb::tries; ++k) {
+        const Inputs z = back ? climb_.moved_back(k, edges_, over_at(k), nearest_) : climb_.tried(k);
+        candidates_.row(k) = reachable(z).transpose();
+      }
+      take(Climb::tries);
+      consider(Climb::tries);
+      if (limits == 0) break;
+    }
+    climb_.narrow();
   }
-  nearest_.begin(rest, InputMatrix::Identity(n, n), low, high);
-  for (std::size_t i = 0; i < limited_.size(); ++i) {
-    auto edge = edges_.row(static_cast<Eigen::Index>(i));
-    slopes(limited_[i].model(), edge, settings_.limits[i].scale);
-    edge = pointing(edge.transpose()).transpose();
-    nearest_.add(edge.transpose(), excess_[i * candidates] > -active_room ? 0.0 : unlimited);
-  }
-  nearest_.solve(0.0);
-  for (std::size_t i = 0; i < limited_.size(); ++i)
-    multipliers_[i] = nearest_.multiplier(i);
+  return climb_.best();
 }
 
 }  // namespace mgdd::optimize

@@ -103,12 +103,15 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       effect_(candidates + most_on_their_way, 0.0),
       over_(candidates, 0.0),
       mean_over_(candidates, 0.0),
-      excess_(settings_.limits.size() * candidates, 0.0),
+      excess_(InputTable::Zero(static_cast<Eigen::Index>(settings_.limits.size()), candidates)),
+      edge_over_(room_),
+      aside_(Inputs::Constant(settings_.space.size(), slope_step)),
       multipliers_(room_),
       credit_(candidates, 0.0),
       nearest_(settings_.limits.size()),
       order_(candidates, 0),
       worth_(candidates) {
+  if (protocol_.steps.any()) aside_ = aside_.cwiseMax(grid());
   double longest = 0.0;
   const auto add = [&](const ComponentLag& lag) {
     longest = std::max(longest, lag.lag_cycles);

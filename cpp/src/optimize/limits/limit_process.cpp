@@ -11,7 +11,7 @@ namespace {
 constexpr double least_share = 1e-3;   // of a limit, that a reading counts as at least
 constexpr double clear_of_zero = 3.0;  // sd of a reading there, above which the logarithm of a reading has a scatter
 constexpr double expected_bend = 3.0;  // in scales of the limit: few readings must not promise too much
-constexpr double calm = 0.3;           // over what is expected of J: limits wander less, or are seen to
+constexpr double calm = 0.1;           // over what is expected of J: limits wander less, or are seen to
 constexpr double calm_sd = 2.0;        // logarithm
 
 double learnt_of(const Limit& limit, bool logarithm, double value) noexcept {

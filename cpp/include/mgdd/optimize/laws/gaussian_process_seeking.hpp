@@ -23,6 +23,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/ask_tell/seeker.hpp"
 #include "mgdd/optimize/belief/process_model.hpp"
+#include "mgdd/optimize/laws/climb.hpp"
 #include "mgdd/optimize/laws/most_worth.hpp"
 #include "mgdd/optimize/limits/failing_process.hpp"
 #include "mgdd/optimize/limits/limit_process.hpp"
@@ -179,7 +180,6 @@ class GaussianProcessSeeking {
   void judge_safety(int points, double quantile) noexcept;
   void keep_safe(int points, double quantile) noexcept;
   bool pull_back(int points) noexcept;
-  void know_edge(const Inputs& at) noexcept;
   double side_step() const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;
@@ -215,7 +215,10 @@ class GaussianProcessSeeking {
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
   std::vector<double> effect_, over_, mean_over_;
-  std::vector<double> excess_;                // of every limit at the candidates
+  InputTable excess_;  // of every limit at the candidates
+  std::vector<double> edge_over_;
+  Inputs aside_;  // of an input, for slopes
+  Climb climb_;
   std::vector<double> multipliers_, credit_;  // J per scale of a limit
   NearestStep nearest_;
   std::vector<int> order_;
