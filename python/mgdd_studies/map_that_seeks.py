@@ -240,7 +240,7 @@ def run_map_that_seeks(
     >>> from mgdd_studies.map_that_seeks import run_map_that_seeks
     >>> rows = run_map_that_seeks(n_seeds=1, quick=True, figures=False).summary["rows"]
     >>> [row["visits"] for row in rows if row["guide"] == "twice the wall heat" and row["worst_lost_percent"] < 0.1]
-    [6, 12, 24]
+    [12, 24]
     """
     seeds = check_seeds(n_seeds, quick=quick)
     work = Parts(progress)

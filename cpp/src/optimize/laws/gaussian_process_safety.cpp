@@ -96,7 +96,8 @@ bool GaussianProcessSeeking::pull_back(int points) noexcept {
 Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
   const Eigen::Index n = from.size(), limits = edges_.rows();
   const auto take = [&](int points) {
-    judge_safety(points, quantile_);
+    candidates_.row(points) = good_.transpose();  // what may fail is judged beside what worked
+    judge_safety(points + 1, quantile_);
     for (ProcessModel& model : j_)
       model.predict_means(candidates_, points);
   };
