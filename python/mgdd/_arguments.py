@@ -90,8 +90,10 @@ def refusal(
                 culprits.append((place, argument, bound[argument.name]))
                 break
         else:
-            taken = [each for each in arguments if _WHOLE in map(_name, _choices(each.kind))]
-            whole += [(each, operator.index(bound[each.name])) for each in taken if bound.get(each.name) is not None]
+            for each in arguments:
+                value: Any = bound.get(each.name)
+                if _WHOLE in map(_name, _choices(each.kind)) and _is_number(value, whole=True):
+                    whole.append((each, operator.index(value)))
     if not culprits and whole:  # of the right kind, all of them: one is beyond what the core counts with
         argument, value = min(whole, key=lambda each: (each[1] >= 0, -abs(each[1])))
         if value < 0 or value > _MOST:

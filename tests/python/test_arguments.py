@@ -166,6 +166,12 @@ def test_overloads_that_fail_at_the_same_argument_are_named_together() -> None:
     assert str(unknown) == "f() does not take these arguments: it is f(a: object) -> None"
 
 
+def test_a_number_that_is_too_large_is_told_from_a_name_beside_it() -> None:
+    signature = "(a: typing.SupportsInt | str, b: typing.SupportsInt | None = None) -> None"
+    assert str(refusal("f", [signature], ["x", -3], {})) == "b = -3: must be a whole number >= 0"
+    assert "does not take these arguments" in str(refusal("f", [signature], ["x"], {"b": 3}))
+
+
 @pytest.mark.parametrize("soc", ["scalar", "array", "list"])
 def test_numbers_that_carry_a_unit_are_refused_and_not_read_as_radians(soc: str) -> None:
     """Of pint -6 degree is the number -0.105."""

@@ -47,8 +47,8 @@ def _add_seek(parser: Any) -> None:
            f"bounds of an input of the bench ({', '.join(bench_inputs)}), and the step in which it is set; "
            "repeatable: a map of each is sought (default: soc_cad=-30:10)")  # fmt: skip
     option(parser, "--start NAME=X ...",
-           "without --guide: first value of an input, where the limits hold in the middle of the map, repeatable",
-    )  # fmt: skip
+           "without --guide: first value of an input, where the limits hold in the middle of the map, repeatable; left "
+           "out: the middle of the bounds, under limits the safe side of the timing")  # fmt: skip
     option(parser, "--limit NAME=X ...",
            f"keep an indicator, {', '.join(bench_limits)}, below X, or with NAME=LOW:HIGH between two, of which one "
            "may be left out; repeatable")  # fmt: skip

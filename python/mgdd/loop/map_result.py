@@ -282,12 +282,15 @@ def _doubts(
 
 
 def _start_above(seeker: MapSeeking, first: Visit) -> Iterator[Finding]:
-    for limit in seeker.settings["limits"]:
+    own = seeker.settings
+    low = "the guide says too little of it there: narrow the bounds, or set a limit that leaves room"
+    remedy = low if own["guide"] else f"give {argument('start')} where it holds"
+    for limit in own["limits"]:
         (name, side), value = plain_name(limit.name), first.limits[limit.name]
         if value > limit.upper:
             what = "above its" if side > 0.0 else "below its lower"
             text = f"the first reading of {name}, {side * value:.6g}, is {what} limit, {side * limit.upper:.6g}"
-            yield Finding("start_above_limit", (name,), text, f"give {argument('start')} where it holds")
+            yield Finding("start_above_limit", (name,), text, remedy)
 
 
 def _where(axes: Mapping[str, Any], place: Any) -> str:

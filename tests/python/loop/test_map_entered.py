@@ -172,3 +172,9 @@ def test_a_search_without_a_start_begins_where_the_limits_hold_and_one_above_the
     assert any(
         str(one).startswith("the first reading of y, 0.1, is below its lower limit, 0.2;") for one in lower.findings
     )
+    rough = seek_map(
+        lambda x: (x["x"], {"y": 2.0 + x["x"]}), {"x": (-1.0, 1.0)}, {"rpm": [1.0, 2.0]}, visits=2,
+        limits={"y": 2.5}, guide=lambda x: x["x"], limit_guides={"y": lambda x: 1.0 + x["x"]},
+    )  # fmt: skip
+    (above,) = (one for one in rough.findings if one.code == "start_above_limit")
+    assert "the guide says too little of it there" in above.remedy  # a guide leaves no start to give

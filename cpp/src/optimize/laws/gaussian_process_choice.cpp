@@ -71,7 +71,7 @@ void GaussianProcessSeeking::choose() noexcept {
   const bool over = rested_ * hold_ >= resting * hold_ + awaited;
   const int points = over ? 2 : candidates;
   if (!over) draw_candidates();
-  keep_safe(points, cautious_quantile_);
+  keep_safe(points);
   means_.setZero();
   covariance_.setZero();
   double variance = 0.0;

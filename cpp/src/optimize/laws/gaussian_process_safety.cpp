@@ -39,14 +39,13 @@ void GaussianProcessSeeking::judge(double likely, double mean, int point) noexce
 }
 
 // Largest excess of any limit, in scales, of every candidate: that many standard deviations above the mean, and in it.
-void GaussianProcessSeeking::judge_safety(int points, double quantile) noexcept {
+void GaussianProcessSeeking::judge_safety(int points, double quantile, const FailingProcess::Demand& works) noexcept {
   std::fill(over_.begin(), over_.end(), -largest_reading);
   std::fill(mean_over_.begin(), mean_over_.end(), -largest_reading);
   std::fill(credit_.begin(), credit_.end(), 0.0);
   if (failing_.by_input()) {
     failing_.predict(candidates_, points);
-    failing_.judge(points, 0, since_failure_ < wary_ ? wary_of_failing : not_failing,
-                   [this](double likely, double mean, int p) { judge(likely, mean, p); });
+    failing_.judge(points, 0, works, [this](double likely, double mean, int p) { judge(likely, mean, p); });
   }
   for (std::size_t i = 0; i < limited_.size(); ++i) {
     limited_[i].model().predict(candidates_, points);
@@ -61,12 +60,13 @@ void GaussianProcessSeeking::judge_safety(int points, double quantile) noexcept 
 }
 
 // The same, with candidates that break a limit moved back to its edge: in a corner of limits few draws lie inside.
-void GaussianProcessSeeking::keep_safe(int points, double quantile) noexcept {
+void GaussianProcessSeeking::keep_safe(int points) noexcept {
+  const FailingProcess::Demand& works = since_failure_ < wary_ ? wary_of_failing : not_failing;
   for (int round = 0; round < pull_rounds; ++round) {
-    judge_safety(points, quantile);
+    judge_safety(points, cautious_quantile_, works);
     if (!pull_back(points)) return;
   }
-  judge_safety(points, quantile);
+  judge_safety(points, cautious_quantile_, works);
 }
 
 // Along the slopes at the estimate, by projections in turn (Kaczmarz 1937).
@@ -97,7 +97,7 @@ Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
   const Eigen::Index n = from.size(), limits = edges_.rows();
   const auto take = [&](int points) {
     candidates_.row(points) = good_.transpose();  // what may fail is judged beside what worked
-    judge_safety(points + 1, quantile_);
+    judge_safety(points + 1, quantile_, not_failing);
     for (ProcessModel& model : j_)
       model.predict_means(candidates_, points);
   };

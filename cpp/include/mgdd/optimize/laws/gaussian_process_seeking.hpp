@@ -177,8 +177,8 @@ class GaussianProcessSeeking {
   void draw_candidates() noexcept;
   double dither() const noexcept;
   void judge(double likely, double mean, int point) noexcept;
-  void judge_safety(int points, double quantile) noexcept;
-  void keep_safe(int points, double quantile) noexcept;
+  void judge_safety(int points, double quantile, const FailingProcess::Demand& works) noexcept;
+  void keep_safe(int points) noexcept;
   bool pull_back(int points) noexcept;
   double side_step() const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
