@@ -14,6 +14,7 @@ void bind_map_seeking(pybind11::module_& m);
 void bind_learning(pybind11::module_& m);
 void bind_controllers(pybind11::module_& m);
 void bind_guided_predictive(pybind11::module_& m);
+void bind_single_precision(pybind11::module_& m);
 void bind_supervisor(pybind11::module_& m);
 void bind_cylinder(pybind11::module_& m);
 void bind_emissions(pybind11::module_& m);

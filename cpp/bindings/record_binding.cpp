@@ -90,6 +90,13 @@ py::dict Members::described() const {
   return out;
 }
 
+py::dict Members::places() const {
+  py::dict out;
+  for (const Member& member : members_)
+    out[as_str(member.info.name)] = as_str(member.place);
+  return out;
+}
+
 py::str Members::text(const char* name, const void* record) const {
   py::list parts;
   for (std::size_t i = 0; i < members_.size(); ++i) {

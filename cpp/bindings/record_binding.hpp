@@ -49,11 +49,12 @@ py::object as_python(const Value& value) {
 /// One member of a record, without its type.
 struct Member {
   FieldInfo info;
-  std::string kind;     ///< as a signature names it
-  py::object standard;  ///< its default as a keyword shows it
-  py::object initial;   ///< ... and as `get` gives it
-  bool per_input;       ///< a default of one number counts for every input
-  py::object choices;   ///< names, or none
+  std::string_view place;  ///< in the record, as C++ writes it
+  std::string kind;        ///< as a signature names it
+  py::object standard;     ///< its default as a keyword shows it
+  py::object initial;      ///< ... and as `get` gives it
+  bool per_input;          ///< a default of one number counts for every input
+  py::object choices;      ///< names, or none
   bool number;
   std::function<py::object(const void*)> get;
   std::function<bool(void*, const py::handle&)> put;  ///< false for a value of another kind
@@ -73,6 +74,8 @@ class Members {
   py::dict to_dict(const void* record) const;
   /// Every member by name: unit, bounds or choices, meaning, default.
   py::dict described() const;
+  /// Where every member stands in the record of the core.
+  py::dict places() const;
   /// `Name(key=value)` with what differs from the defaults.
   py::str text(const char* name, const void* record) const;
   /// Gives __init__ of a class the signature and the help of its keywords.
@@ -118,6 +121,7 @@ Member member_of(const Field<Record, T>& field, const Record& standard) {
   if constexpr (per_input) shown = W::shown(field.in(standard));
   return {
       field.info,
+      field.member,
       kind_text<Argument>() + (none ? " | None" : ""),
       shown,
       initial,
@@ -221,6 +225,7 @@ void bind_stepped(py::class_<Stepped>& cls, const char* name) {
   cls.def_static(
       "fields", [&members] { return members.described(); },
       "Every setting by name: unit, bounds or choices, meaning, default.");
+  cls.def_static("_members", [&members] { return members.places(); }, "Member of the C++ settings by name.");
   cls.def_property_readonly(
       "settings", [&members](const Stepped& self) { return members.to_dict(&self.settings()); },
       "All settings as a new dict: keywords that make the controller again.");

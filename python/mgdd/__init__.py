@@ -20,6 +20,7 @@ from mgdd._core import __version__
 
 __all__ = [
     "__version__",
+    "cmake_dir",
     "control",
     "datasets",
     "design",
@@ -42,6 +43,33 @@ __all__ = [
     "sweep",
     "throttle",
 ]
+
+
+def cmake_dir() -> str:
+    """Return the folder of ``mgddConfig.cmake``, the C++ controllers of this package for CMake.
+
+    ``find_package(mgdd COMPONENTS control)`` with ``-Dmgdd_DIR=...`` gives the target ``mgdd::control``, compiled from
+    source for the target of the project that asks. It needs C++20 and no Eigen.
+
+    Returns
+    -------
+    str
+        For ``-Dmgdd_DIR``.
+
+    See Also
+    --------
+    mgdd.loop.export_controller : a tuned controller as such a project.
+
+    Examples
+    --------
+    >>> import mgdd
+    >>> from pathlib import Path
+    >>> (Path(mgdd.cmake_dir()) / "mgddConfig.cmake").is_file()
+    True
+    """
+    from pathlib import Path
+
+    return str(Path(__file__).parent / "cpp" / "cmake")
 
 
 def __getattr__(name: str) -> Any:

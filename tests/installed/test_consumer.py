@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from cpp_tools import configure, run, tool
 
 ROOT = Path(__file__).resolve().parents[2]
 # As the preset `dev`, so that a compiler cache knows the objects again.
@@ -21,26 +20,6 @@ AS_DEV = {
     "Python_EXECUTABLE": sys.executable,
 }
 WARNINGS = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror"
-
-
-def run(*command: str | Path) -> str:
-    """Run a program, which must succeed; gives what it printed, and shows it all when it fails."""
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    assert done.returncode == 0, f"{command} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
-    return done.stdout
-
-
-def tool(name: str) -> str:
-    """Find cmake or ninja: beside the interpreter first, as the build requirements put them there."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-    found = shutil.which(name, path=path)
-    assert found, f"{name} is missing"
-    return found
-
-
-def configure(source: Path, build: Path, **variables: str) -> None:
-    defines = [f"-D{name}={value}" for name, value in variables.items()]
-    run(tool("cmake"), "-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}", "-S", source, "-B", build, *defines)
 
 
 @pytest.fixture(scope="session")
@@ -113,3 +92,16 @@ def test_flags_of_the_consumer_do_not_change_a_bit(build: Callable[..., Path], t
     assert len(plain) == 8
     for flags, text in printed.items():
         assert text.splitlines() == plain, f"with {flags!r}"
+
+
+def test_the_controllers_alone_need_no_eigen(install: Callable[[str], Path], tmp_path: Path) -> None:
+    source = ROOT / "cpp" / "examples" / "throttle_step.cpp"
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(step LANGUAGES CXX)\n"
+        "find_package(mgdd REQUIRED COMPONENTS control)\n"
+        f"add_executable(step {source})\ntarget_link_libraries(step PRIVATE mgdd::control)\n"
+    )
+    configure(tmp_path, tmp_path / "build", CMAKE_PREFIX_PATH=str(install("include")), CMAKE_CXX_FLAGS=WARNINGS)
+    run(tool("cmake"), "--build", tmp_path / "build")
+    assert ", 0 allocations, " in run(tmp_path / "build" / "step")
+    assert "Eigen" not in (tmp_path / "build" / "CMakeCache.txt").read_text()

@@ -10,12 +10,15 @@ from pathlib import Path
 
 import pytest
 
+from cpp_tools import configure, run, tool
+
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
 PACKAGE_FILES = re.compile(
     r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|report/templates/[^/]+\.(html|css)"
-    r"|data/([^/]+/)*[^/]+\.(csv|txt|toml)|rig/(can/buses|envelopes)/[^/]+\.(dbc|toml)|.*\.pyc)"
+    r"|cpp/(cmake/[^/]+\.cmake|include/mgdd/(common|control|dynamics|math)/[^/]+\.hpp|src/control/[^/]+\.cpp"
+    r"|export/(main\.cpp|CMakeLists\.txt))|data/([^/]+/)*[^/]+\.(csv|txt|toml)|rig/(can/buses|envelopes)/[^/]+\.(dbc|toml)|.*\.pyc)"
     r"|mgdd_studies/(.*\.pyc?|py\.typed)|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
 )
 HEAVY = {"scipy", "xarray", "pandas", "matplotlib", "rich", "jinja2", "pooch", "packaging"}
@@ -87,6 +90,17 @@ def test_the_studies_are_found_by_their_entry_point(environment: Path, tmp_path:
     code = "import importlib.metadata as m; print(*m.entry_points(group='mgdd.studies'), sep='\\n')"
     assert "mgdd_studies.command" in call(environment / "bin" / "python", "-c", code, cwd=tmp_path)
     assert "sensor-delay" in call(environment / "bin" / "mgdd", "study", "--list", cwd=tmp_path)
+
+
+def test_a_cmake_project_finds_the_controllers(environment: Path, tmp_path: Path) -> None:
+    """Exported, compiled against what was installed, equal bit by bit."""
+    call(environment / "bin" / "mgdd", "throttle", "export", "guided", "-o", "target", cwd=tmp_path)
+    found = call(environment / "bin" / "python", "-c", "import mgdd; print(mgdd.cmake_dir())", cwd=tmp_path).strip()
+    assert Path(found).is_relative_to(environment)
+    configure(tmp_path / "target", tmp_path / "build", mgdd_DIR=found)
+    run(tool("cmake"), "--build", tmp_path / "build")
+    printed = run(tmp_path / "build" / "throttle_controller")
+    assert printed.startswith("passed: 1500 samples, 1500 equal, 0 wrong, largest difference 0, ")
 
 
 @pytest.mark.parametrize("line", COMMANDS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -221,7 +220,7 @@ FORMS: dict[str, Callable[[Array], Any]] = {
 def takers() -> Iterable[str]:
     """Public functions and methods that say ArrayLike, protocols and constructors of results left out."""
     for module in mgdd.__all__:
-        room = importlib.import_module(f"mgdd.{module}") if module != "__version__" else None
+        room = getattr(mgdd, module)
         for name in getattr(room, "__all__", ()):
             thing = getattr(room, name)
             members = vars(thing).items() if inspect.isclass(thing) else [("", thing)]

@@ -1,6 +1,8 @@
-// Binds include/mgdd/control: PID and sliding mode, one sample at a time.
+// Binds include/mgdd/control: PID and sliding mode, one sample at a time; and any controller on float.
+#include <variant>
 
 #include "binding.hpp"
+#include "mgdd/control/guided_predictive.hpp"
 #include "mgdd/control/pid.hpp"
 #include "mgdd/control/plate.hpp"
 #include "mgdd/control/sliding_mode.hpp"
@@ -167,12 +169,36 @@ True
   cls.def_property_readonly("surface_deg_per_s", &SlidingMode::surface_deg_per_s, "s of the last sample [deg/s].");
 }
 
+/// A controller as a target computes it that has floating point of 32 bits only.
+struct SinglePrecision {
+  std::variant<BasicGuidedPredictive<float>, BasicPid<float>, BasicSlidingMode<float>> controller;
+};
+
 }  // namespace
 
 void bind_controllers(py::module_& m) {
   bind_plate(m);
   bind_pid(m);
   bind_sliding_mode(m);
+}
+
+void bind_single_precision(py::module_& m) {
+  py::class_<SinglePrecision>(m, "SinglePrecision", "A new controller of the same settings on float.")
+      .def(py::init([](const GuidedPredictive& c) -> SinglePrecision {
+             return {BasicGuidedPredictive<float>(c.settings())};
+           }),
+           py::arg("controller"))
+      .def(py::init([](const Pid& c) -> SinglePrecision { return {BasicPid<float>(c.settings())}; }),
+           py::arg("controller"))
+      .def(py::init([](const SlidingMode& c) -> SinglePrecision { return {BasicSlidingMode<float>(c.settings())}; }),
+           py::arg("controller"))
+      .def(
+          "step",
+          [](SinglePrecision& self, float reference, float measured) {
+            return std::visit([&](auto& c) { return c.step(reference, measured); }, self.controller);
+          },
+          py::arg("reference_deg"), py::arg("measurement_deg"),
+          "Duty [-] of this sample; the angles [deg] are rounded.");
 }
 
 }  // namespace mgdd::bindings

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['GuidedPredictive', 'Pid', 'Plate', 'SlidingMode', 'ThrottleSupervisor']
+__all__: list[str] = ['GuidedPredictive', 'Pid', 'Plate', 'SinglePrecision', 'SlidingMode', 'ThrottleSupervisor']
 class Plate:
     """
     What a controller knows of a throttle plate; ``Plate.fields()`` lists it.
@@ -179,6 +179,11 @@ class Pid:
     True
     """
     @staticmethod
+    def _members() -> dict:
+        """
+        Member of the C++ settings by name.
+        """
+    @staticmethod
     def fields() -> dict:
         """
         Every setting by name: unit, bounds or choices, meaning, default.
@@ -324,6 +329,11 @@ class SlidingMode:
     >>> abs(values["angle_deg"] - 40.0) < 0.3
     True
     """
+    @staticmethod
+    def _members() -> dict:
+        """
+        Member of the C++ settings by name.
+        """
     @staticmethod
     def fields() -> dict:
         """
@@ -492,6 +502,11 @@ class GuidedPredictive:
     >>> sorted(controller.learnt)
     ['bias_above', 'bias_below', 'damping_factor', 'friction_above', 'friction_below', 'gain_factor']
     """
+    @staticmethod
+    def _members() -> dict:
+        """
+        Member of the C++ settings by name.
+        """
     @staticmethod
     def fields() -> dict:
         """
@@ -706,6 +721,11 @@ class ThrottleSupervisor:
     ((0.3, False), 'limited', 'reference_range')
     """
     @staticmethod
+    def _members() -> dict:
+        """
+        Member of the C++ settings by name.
+        """
+    @staticmethod
     def fields() -> dict:
         """
         Every setting by name: unit, bounds or choices, meaning, default.
@@ -835,3 +855,22 @@ class ThrottleSupervisor:
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+class SinglePrecision:
+    """
+    A new controller of the same settings on float.
+    """
+    @typing.overload
+    def __init__(self, controller: GuidedPredictive) -> None:
+        ...
+    @typing.overload
+    def __init__(self, controller: Pid) -> None:
+        ...
+    @typing.overload
+    def __init__(self, controller: SlidingMode) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Duty [-] of this sample; the angles [deg] are rounded.
+        """

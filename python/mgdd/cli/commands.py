@@ -85,7 +85,7 @@ COMMANDS = {
     "map export": Command(
         "write maps in another form: netCDF, CSV, DCM, CDFX", "smooth.nc --label SocBase -o engine.dcm", "map_export",
         f"{_MAP}, which may hold several maps"),
-    "throttle": Command("an electronic throttle: simulate, demand, excite, identify, validate, track, tune"),
+    "throttle": Command("an electronic throttle: simulate, demand, excite, identify, validate, track, tune, export"),
     "throttle simulate": Command(
         "simulate a throttle from rest and print the summary of its step; -o FILE.csv writes the run",
         "--preset P1 --duty 0.6 --duration-s 0.3 --json", "throttle", ".json or .csv"),
@@ -110,6 +110,9 @@ COMMANDS = {
     "throttle tune": Command(
         "tune a controller for throttles around a preset, with one cost and budget for every kind",
         "--controller pid --preset P2 --budget 60 --throttles 8 --json", "throttle_track"),
+    "throttle export": Command(
+        "write a controller as C++ for a target, with the samples of a tracked run as its test",
+        "pid --preset P2 --float -o target", "throttle_track", "a folder: settings, step, test vectors, CMake"),
     "rig": Command("experiments in process, over a CAN bus and on a bench"),
     "rig run": Command(
         "run an experiment: identify or track on a throttle, seek or map on an engine; in process, over a bus, on a "

@@ -39,7 +39,8 @@ def whole_or_part(work: Callable[..., Report], *given: Any, **options: Any) -> t
 
 def check_files(args: argparse.Namespace) -> None:
     """Refuse an output file or a figure of unknown kind before any work is done."""
-    check_file("-o", args.output, args.endings)
+    if args.endings:  # none of a folder
+        check_file("-o", args.output, args.endings)
     check_file("--figure", vars(args).get("figure"), (".png", ".svg", ".pdf"))
 
 

@@ -4,7 +4,8 @@
 inputs by name, ``measure``. `run_seeker` closes the loop on any of them and on a test rig, `monte_carlo` does so for
 seeds, gains and operating points of the bench, or on a compiled function, on all cores or an executor,
 `VirtualEngine.find_optimum` says where a seeker should end. `track` and `track_many` run controllers of the throttle
-along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's torque.
+along a `Reference`, `export_controller` writes one as C++, `simulate_drive` runs a throttle between the pedal and the
+engine's torque.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from mgdd._rooms import furnish as _furnish
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.drive import simulate_drive
 from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop.export import export_controller
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.many_loops import monte_carlo
 from mgdd.loop.many_tracks import track_many
@@ -45,6 +47,7 @@ __all__ = [
     "VirtualEngine",
     "VirtualTestBed",
     "VirtualThrottle",
+    "export_controller",
     "monte_carlo",
     "run_seeker",
     "seek",

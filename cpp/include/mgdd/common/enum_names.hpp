@@ -21,7 +21,7 @@ using Names = std::span<const std::pair<Enum, std::string_view>>;
 
 namespace detail {
 
-/// The name of an enumerator; "" for a number without one, which compilers write as a cast.
+/// The name of an enumerator or a member; "" for a number without one, which compilers write as a cast.
 template <auto value>
 constexpr std::string_view spelling() noexcept {
   constexpr std::string_view key = "value = ";

@@ -1,6 +1,6 @@
 // One table of fields per parameter record: name, unit, domain and meaning of every member. It gives the check of the
-// record, its keywords, dict and file form, its help text and the bounds of a search. A table is a range of fields of
-// one type, a field, or a tuple of tables; `fields_of(const Record&)` beside the record gives its own.
+// record, its keywords, dict, file and C++ form, its help text and the bounds of a search. A table is a range of fields
+// of one type, a field, or a tuple of tables; `fields_of(const Record&)` beside the record gives its own.
 #pragma once
 
 #include <array>
@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/enum_names.hpp"
 
 namespace mgdd {
 
@@ -40,6 +41,7 @@ template <class Owner, class T = double>
 struct Field {
   FieldInfo info;
   T& (*access)(Owner&) noexcept;
+  std::string_view member;  ///< the same way as C++ writes it: "geometry.bore_mm"
 
   T& in(Owner& owner) const noexcept { return access(owner); }
   const T& in(const Owner& owner) const noexcept { return access(const_cast<Owner&>(owner)); }  // read only
@@ -54,6 +56,19 @@ struct OwnerOf<T Owner::*> {
   using type = Owner;
 };
 
+template <auto... Members>
+inline constexpr auto written_members = [] {
+  std::array<char, (spelling<Members>().size() + ...) + sizeof...(Members) - 1> letters{};
+  std::size_t at = 0;
+  const auto append = [&](std::string_view name) {
+    if (at > 0) letters[at++] = '.';
+    for (const char letter : name)
+      letters[at++] = letter;
+  };
+  (append(spelling<Members>()), ...);
+  return letters;
+}();
+
 }  // namespace detail
 
 /// `field<&Cylinder::geometry, &GeometryParameters::bore_mm>({"bore_mm", "mm", above(0.0, 2000.0), "bore"})`.
@@ -61,7 +76,9 @@ template <auto First, auto... Rest>
 constexpr auto field(const FieldInfo& info) {
   using Owner = typename detail::OwnerOf<decltype(First)>::type;
   using T = std::remove_reference_t<decltype(((std::declval<Owner&>().*First).*....*Rest))>;
-  return Field<Owner, T>{info, [](Owner& owner) noexcept -> T& { return ((owner.*First).*....*Rest); }};
+  constexpr auto& letters = detail::written_members<First, Rest...>;
+  return Field<Owner, T>{info, [](Owner& owner) noexcept -> T& { return ((owner.*First).*....*Rest); },
+                         std::string_view(letters.data(), letters.size())};
 }
 
 /// A member that is no number with a domain: a choice, a switch, a list, a record.

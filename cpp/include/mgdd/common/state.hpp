@@ -2,9 +2,9 @@
 // A class lists its mutable members once, in `visit`; writing and reading walk the same list. Offline code.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -23,6 +23,14 @@ using StateColumns = std::map<std::string, std::vector<double>>;
 /// End of a whole number that only counts: exact as a double, more than a run of centuries reaches, and far enough from
 /// the ends of a word for what is added to it or multiplied with it.
 inline constexpr std::int64_t counts_end = std::int64_t{1} << 48;
+
+/// A vector or matrix of Eigen, whose headers a microcontroller does without.
+template <class M>
+concept DenseMatrix = requires(M& matrix) {
+  typename M::PlainObject;
+  { matrix.data() } -> std::convertible_to<const double*>;
+  matrix.size();
+};
 
 /// Collects members into columns. Integers below 2^53 and booleans are exact as doubles, a full word as its halves.
 class StateWriter {
@@ -54,8 +62,8 @@ class StateWriter {
   void operator()(std::string_view name, const std::array<double, N>& value) {
     put(name, {value.begin(), value.end()});
   }
-  template <class Derived>
-  void operator()(std::string_view name, const Eigen::PlainObjectBase<Derived>& value) {
+  template <DenseMatrix M>
+  void operator()(std::string_view name, const M& value) {
     put(name, std::vector<double>(value.data(), value.data() + value.size()));
   }
 
@@ -108,8 +116,8 @@ class StateReader {
   void operator()(std::string_view name, std::array<double, N>& value) {
     copy(column(name, N), value.data());
   }
-  template <class Derived>
-  void operator()(std::string_view name, Eigen::PlainObjectBase<Derived>& value) {
+  template <DenseMatrix M>
+  void operator()(std::string_view name, M& value) {
     copy(column(name, static_cast<std::size_t>(value.size())), value.data());
   }
 
