@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing of Debian's packages. Each check looks for the thing itself, so that a compiler or a Python
 # from elsewhere is as good; without apt it names what to install. Usage: tools/system_packages.sh GROUP...
-# Groups: build (compile the module), test, browser (for tests of the live page), bench, clang, mingw.
+# Groups: build (compile the module), test, browser (for tests of the live page), bench, clang, mingw, target (2.4 GB:
+# a Cortex-M for tests of exported controllers, which are skipped without).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -43,6 +44,10 @@ for group in "$@"; do
     browser) has chromium || has chromium-browser || useful+=(chromium) ;;
     bench) has_header benchmark/benchmark.h || missing+=(libbenchmark-dev) ;;
     clang) has clang++ || missing+=(clang) ;;
+    target)
+      has arm-none-eabi-g++ || missing+=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib)
+      has qemu-system-arm || missing+=(qemu-system-arm)
+      ;;
     mingw) has x86_64-w64-mingw32-g++-posix || missing+=(g++-mingw-w64-x86-64-posix) ;;
     *) echo "unknown group: $group" >&2; exit 2 ;;
   esac

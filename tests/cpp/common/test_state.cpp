@@ -1,5 +1,6 @@
 #include "mgdd/common/state.hpp"
 
+#include <Eigen/Core>
 #include <limits>
 
 #include <gtest/gtest.h>
