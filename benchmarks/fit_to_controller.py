@@ -17,7 +17,6 @@ import argparse
 import json
 import statistics
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,27 +30,11 @@ from mgdd.loop import track_many, tune_controller, tuned_controller
 from mgdd.loop.tune import tracking_cost, tuning_references
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python" / "support"))
-from independent_throttle import FAMILIES, Bench, Body
-from throttle_bodies import draw_body, make_logs
+from independent_throttle import FAMILIES, Body
+from throttle_bodies import BodyPlate, draw_body, make_logs
 
 KINDS = ("pid", "sliding_mode", "linear_mpc", "guided")
 NEVER_MS = 600.0
-
-
-class BodyPlate:
-    """A body as a plant of one's own; its delay is the loop's."""
-
-    def __init__(self, body: Body) -> None:
-        self._bench = Bench(replace(body, delay_samples=0))
-
-    @property
-    def output(self) -> float:
-        """Angle now [deg]."""
-        return self._bench.angle_deg
-
-    def step(self, duty: float) -> None:
-        """Let a duty act for 1 ms."""
-        self._bench.sample(duty)
 
 
 def figures(controller: Any, body: Body) -> dict[str, float]:

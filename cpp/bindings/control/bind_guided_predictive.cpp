@@ -80,7 +80,7 @@ observer_angle_per_s, observer_speed_per_s2 : float
 noise_deg : float
     Standard deviation of the measured angle [deg]: what counts as motion.
 learning_rate_per_s, gain_weight, damping_weight : float
-    Learning: share of what explains an innovation, per time [1/s], and the first variances of the factors of gain and
+    Learning: share of what explains an innovation, per time [1/s] of a sample up to 1 ms, and the first variances of the factors of gain and
     damping over that of a friction level [-].
 level_memory_s, memory_s : float
     Time of sliding after which a friction level, and gain and damping, are as uncertain as at first [s].
@@ -99,6 +99,9 @@ switching : {"predicted", "measured"}
     How the prediction knows its side of limp-home.
 delay_samples : int
     From a duty to its effect, beside the electrical lag: 0 to 20.
+delay_search_samples : int
+    With learning: longer delays, by 1 to so many samples, that are tried against the readings beside the given one; 0
+    for none, 6 at most.
 move_steps : sequence of three int
     Prediction steps for which each duty of the horizon is held; together at most 64.
 gauss_newton_steps : int
@@ -166,6 +169,9 @@ void bind_guided_predictive(py::module_& m) {
                             "How often a learnt belief was given up for the certified one.");
   cls.def_property_readonly("innovation_deg", &GuidedPredictive::innovation_deg,
                             "Measured less predicted angle of the last sample [deg].");
+  cls.def_property_readonly("delay_found_samples", &GuidedPredictive::delay_samples,
+                            "Samples from a duty to its effect by which the plate is predicted now: `delay_samples` "
+                            "until the readings speak for more.");
   cls.def_property_readonly("holds", &GuidedPredictive::holds, "Whether the plate is held where it is stuck.");
 }
 

@@ -67,6 +67,8 @@ tracking_error_deg, tracking_s : float
     Error [deg] that must not last [s].
 overload_duty, overload_s : float
     Duty [-] that must not last away from the stops [s].
+oscillation_deg, oscillation_s : float
+    Error [deg] whose side must not change six times in a row, each within that time [s], while the reference stands.
 limp_home_band_deg, return_s : float
     The plate is at limp-home so near to it [deg], and must be after that time with the bridge open [s].
 healthy_s : float
@@ -85,8 +87,8 @@ mgdd.loop.ThrottleFault : faults to try it on.
 Notes
 -----
 Reasons: ``missing_reference``, ``reference_range``, ``missing_sample``, ``stale_sample``, ``sensor_range``,
-``sensor_disagreement``, ``invalid_duty``, ``supply_low``, ``supply_lost``, ``jammed``, ``spring_lost``, ``tracking``
-and ``overload``; ``none`` while nothing was wrong since the last acknowledgement.
+``sensor_disagreement``, ``invalid_duty``, ``supply_low``, ``supply_lost``, ``jammed``, ``spring_lost``, ``tracking``,
+``overload`` and ``oscillation``; ``none`` while nothing was wrong since the last acknowledgement.
 
 References
 ----------

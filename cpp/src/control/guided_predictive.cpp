@@ -55,6 +55,16 @@ double speed_gain_of(const GuidedPredictiveSettings& s) noexcept {
   return (1.0 - 2.0 * std::exp(-half) * shape + std::exp(-2.0 * half)) / s.sample_s;
 }
 
+// A bank only where the members learn: beliefs that stand still do not tell delays apart.
+int delays_of(const GuidedPredictiveSettings& s) noexcept {
+  return s.friction_learning ? 1 + std::min(s.delay_search_samples, longest_control_delay - s.delay_samples) : 1;
+}
+
+template <class T>
+std::array<PlateObserver<T>, most_delays> alike(const PlateObserver<T>& one) noexcept {
+  return {one, one, one, one, one, one, one};
+}
+
 }  // namespace
 
 template <class T>
@@ -63,12 +73,14 @@ BasicGuidedPredictive<T>::BasicGuidedPredictive(const GuidedPredictiveSettings& 
       observed_(s.plate, s.sample_s, PlateFriction::set_valued),
       predicted_(s.plate, s.prediction_step_s, friction_form(s)),
       proven_(observed_),
-      angle_share_(static_cast<T>(1.0 - std::exp(-s.observer_angle_per_s * s.sample_s))),
-      speed_gain_(static_cast<T>(speed_gain_of(s))),
+      gains_{static_cast<T>(1.0 - std::exp(-s.observer_angle_per_s * s.sample_s)), static_cast<T>(speed_gain_of(s)),
+             T(s.plate.closed_deg), T(s.plate.open_deg)},
       slow_(static_cast<T>(std::max(slow_deg_per_s, slow_deviations * speed_gain_of(s) * s.noise_deg))),
-      learner_(s.learner, s.plate, s.sample_s, s.noise_deg, angle_share_, speed_gain_),
+      bank_(delays_of(s), s.sample_s, s.noise_deg),
+      members_(alike(PlateObserver<T>{.belief = observed_.belief(),
+                                      .learner = FrictionLearner<T>(s.learner, s.plate, s.sample_s, s.noise_deg,
+                                                                    gains_.angle_share, gains_.speed_gain)})),
       review_(s.review, s.sample_s, s.noise_deg),
-      belief_(observed_.belief()),
       reference_(s.reference.lag_s, s.sample_s, s.reference.jump_deg_per_s) {}
 
 template <class T>
@@ -78,57 +90,43 @@ void BasicGuidedPredictive<T>::start(T angle_deg, T duty) noexcept {
   holds_ = false;
   still_ = 0;
   above_ = !(angle_deg < T(settings_.plate.spring.limp_home_deg));
-  state_ = proven_state_ = observed_.at_rest(angle_deg, duty);
-  mean_torque_ = duty_ = duty;
+  proven_state_ = observed_.at_rest(angle_deg, duty);
+  for (PlateObserver<T>& member : members_)
+    member.start(proven_state_);
+  bank_.restart();
+  duty_ = duty;
   sent_.fill(duty);
   moves_.fill(duty);
-  innovation_ = mean_error_ = trim_ = T(0.0);
-  learner_.forget();
+  mean_error_ = trim_ = T(0.0);
   review_.restart();
-}
-
-template <class T>
-FrictionBand<T>& BasicGuidedPredictive<T>::band_at(T angle_deg) noexcept {
-  return angle_deg < T(settings_.plate.spring.limp_home_deg) ? belief_.below : belief_.above;
 }
 
 template <class T>
 void BasicGuidedPredictive<T>::prepare() noexcept {
   if (!started_ || prepared_) return;
-  const T acting = sent_.before[static_cast<std::size_t>(settings_.delay_samples)];
-  observed_.believe(belief_);
-  mean_torque_ = observed_.mean_torque(state_, acting);
-  observed_.step(state_, acting);
-  if (settings_.friction_learning) proven_.step(proven_state_, acting);
+  auto delay = static_cast<std::size_t>(settings_.delay_samples);
+  for (PlateObserver<T>& member : members())
+    member.predict(observed_, sent_.before[delay++]);
+  if (settings_.friction_learning) proven_.step(proven_state_, sent_.before[static_cast<std::size_t>(delay_samples())]);
   prepared_ = true;
-}
-
-// Moves a predicted state to a measurement; gives the innovation.
-template <class T>
-T BasicGuidedPredictive<T>::corrected(PlateState<T>& state, T measurement_deg) noexcept {
-  const T innovation = measurement_deg - state.angle_deg;
-  state.angle_deg = std::clamp(state.angle_deg + angle_share_ * innovation, T(settings_.plate.closed_deg),
-                               T(settings_.plate.open_deg));
-  state.speed_deg_per_s += speed_gain_ * innovation;
-  return innovation;
 }
 
 // Whether what was learnt was given up for the certified belief, whose innovation this is.
 template <class T>
 bool BasicGuidedPredictive<T>::review(T innovation, bool slides) noexcept {
   if (!slides) return false;
-  const Verdict verdict = review_.judge(innovation_, innovation);
+  const Verdict verdict = review_.judge(now().innovation, innovation);
   if (verdict == Verdict::keep) return false;
   review_.restart();
   if (verdict == Verdict::certify) {
-    proven_.believe(belief_);
-    proven_state_ = state_;
+    proven_.believe(now().belief);
+    proven_state_ = now().state;
     return false;
   }
-  belief_ = proven_.belief();
-  state_ = proven_state_;
-  innovation_ = innovation;
-  learner_.reset();
+  now().belief = proven_.belief();
+  now().state = proven_state_;
+  now().innovation = innovation;
+  now().learner.reset();
   ++rollbacks_;
   return true;
 }
@@ -136,37 +134,40 @@ bool BasicGuidedPredictive<T>::review(T innovation, bool slides) noexcept {
 template <class T>
 void BasicGuidedPredictive<T>::correct(T measurement_deg) noexcept {
   const GuidedPredictiveSettings& s = settings_;
-  const T predicted = state_.angle_deg, speed = state_.speed_deg_per_s, last = innovation_;
-  innovation_ = corrected(state_, measurement_deg);
+  std::array<T, most_delays> innovations{};
+  std::size_t j = 0;
+  for (PlateObserver<T>& member : members()) {
+    member.correct(gains_, measurement_deg);
+    innovations[j++] = member.innovation;
+  }
   if (!s.friction_learning) {
-    const T step = T(s.bias_rate_per_deg_s * s.sample_s) * innovation_;
-    for (FrictionBand<T>* band : {&belief_.above, &belief_.below})
+    const T step = T(s.bias_rate_per_deg_s * s.sample_s) * now().innovation;
+    for (FrictionBand<T>* band : {&now().belief.above, &now().belief.below})
       band->bias = std::clamp(band->bias - step, T(-largest_bias), T(largest_bias));
     return;
   }
-  const bool slides = speed != T(0.0) || proven_state_.speed_deg_per_s != T(0.0);
-  const T proven_innovation = corrected(proven_state_, measurement_deg);
-  if (predicted < T(s.plate.closed_deg + end_deg) || predicted > T(s.plate.open_deg - end_deg)) {
-    learner_.forget();
-    return;
+  const bool slides = now().predicted.speed_deg_per_s != T(0.0) || proven_state_.speed_deg_per_s != T(0.0);
+  const T proven_innovation = gains_.correct(proven_state_, measurement_deg);
+  const auto stopped = [&](T angle) {
+    return angle < T(s.plate.closed_deg + end_deg) || angle > T(s.plate.open_deg - end_deg);
+  };
+  const bool rolled_back = !stopped(now().predicted.angle_deg) && review(proven_innovation, slides);
+  for (PlateObserver<T>& member : members()) {
+    if (!(rolled_back && &member == &now())) member.learn(observed_, stopped(member.predicted.angle_deg));
   }
-  if (review(proven_innovation, slides)) return;
-  const T push = mean_torque_ - observed_.holding(predicted);
-  if (speed != T(0.0)) {
-    learner_.slide(belief_, band_at(predicted), innovation_, {push, speed, observed_.damped()});
-    return;
-  }
-  const T moves = learner_.stick(band_at(predicted), innovation_, last, push);
-  const T now = state_.speed_deg_per_s;
-  state_.speed_deg_per_s = moves > T(0.0) ? std::max(now, moves) : std::min(now, moves);
+  if (!bank_.judge(innovations)) return;
+  // What the wrong delay taught is not gone back to.
+  proven_.believe(now().belief);
+  proven_state_ = now().state;
+  review_.restart();
 }
 
 template <class T>
 void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> preview_deg) noexcept {
   const GuidedPredictiveSettings& s = settings_;
-  observed_.believe(belief_);
-  horizon_.ahead = state_;
-  for (int i = s.delay_samples - 1; i >= 0; --i)
+  observed_.believe(now().belief);
+  horizon_.ahead = now().state;
+  for (int i = delay_samples() - 1; i >= 0; --i)
     observed_.step(horizon_.ahead, sent_.before[static_cast<std::size_t>(i)]);
   const T room = T(s.duty_rate_per_s * s.sample_s);
   horizon_.before = sent_.before[0];
@@ -179,7 +180,7 @@ void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> 
   for (int k = 0; k < settings_.n_steps(); ++k) {
     T target = reference_.value() + reference_.rate() * T(s.prediction_step_s) * T(k + 1);
     if (!preview_deg.empty()) {
-      const auto wanted = static_cast<std::size_t>(T(s.delay_samples) + per_step * T(k + 1));
+      const auto wanted = static_cast<std::size_t>(T(delay_samples()) + per_step * T(k + 1));
       for (; read < std::min(wanted, preview_deg.size()) && std::isfinite(preview_deg[read]); ++read)
         last = preview_deg[read];
       target = last;
@@ -215,7 +216,7 @@ bool BasicGuidedPredictive<T>::hold_still() noexcept {
   }
   if (!holds_) return false;
   const T angle = horizon_.ahead.angle_deg;
-  const FrictionBand<T>& band = band_at(angle);
+  const FrictionBand<T>& band = observed_.band_at(angle);
   const T middle = observed_.holding(angle) + band.bias, half = T(hold_share) * band.friction;
   const bool stopped = angle < T(s.plate.closed_deg + end_deg) || angle > T(s.plate.open_deg - end_deg);
   const T most = T((stopped ? release_duty_per_s : hold_duty_per_s) * s.sample_s);
@@ -258,7 +259,7 @@ T BasicGuidedPredictive<T>::feedback(T reference_deg, T measurement_deg, std::sp
   if (std::isfinite(measurement_deg)) correct(measurement_deg);
   look_ahead(measurement_deg, preview_deg);
   if (!(s.friction_learning && hold_still())) {
-    PlateBelief<T> belief = belief_;
+    PlateBelief<T> belief = now().belief;
     if (s.prediction == Prediction::linear) {
       const T share = limited_share(horizon_.wanted, T(feed_forward_deg));
       belief.above.bias += share * belief.above.friction;
@@ -301,18 +302,21 @@ void BasicGuidedPredictive<T>::reset() noexcept {
   started_ = prepared_ = holds_ = false;
   above_ = true;
   still_ = 0;
-  state_ = {};
-  belief_.above = belief_.below = {T(0.0), T(settings_.plate.friction)};
-  belief_.gain_factor = belief_.damping_factor = T(1.0);
-  proven_.believe(belief_);
+  bank_.reset();
+  PlateObserver<T>& first = members_[0];
+  first.start({});
+  first.belief.above = first.belief.below = {T(0.0), T(settings_.plate.friction)};
+  first.belief.gain_factor = first.belief.damping_factor = T(1.0);
+  first.learner.reset();
+  members_ = alike(first);
+  proven_.believe(first.belief);
   proven_state_ = {};
   rollbacks_ = 0;
-  learner_.reset();
   review_.restart();
   reference_.forget();
   sent_.fill(T(0.0));
   moves_.fill(T(0.0));
-  mean_torque_ = innovation_ = mean_error_ = trim_ = duty_ = T(0.0);
+  mean_error_ = trim_ = duty_ = T(0.0);
   horizon_ = {};
 }
 
@@ -326,18 +330,21 @@ void BasicGuidedPredictive<T>::take_over(T measurement_deg, T duty) noexcept {
 template <class T>
 void BasicGuidedPredictive<T>::set_belief(const PlateBelief<T>& belief) {
   require_usable_belief(widened(belief), settings_);
-  belief_ = belief;
+  for (PlateObserver<T>& member : members_) {
+    member.belief = belief;
+    member.learner.reset();
+  }
   proven_.believe(belief);
-  learner_.reset();
   review_.restart();
 }
 
 template <class T>
 void BasicGuidedPredictive<T>::require_usable() const {
   require_usable_duty(duty_, settings_.duty);
-  require_usable_belief(widened(belief_), settings_);
+  for (const PlateObserver<T>& member : members_)
+    require_usable_belief(widened(member.belief), settings_);
   require_usable_belief(widened(proven_.belief()), settings_, "certified_");
-  if (!learner_.is_usable()) {
+  if (!std::ranges::all_of(members_, [](const auto& member) { return member.learner.is_usable(); })) {
     fail(ParameterError("state column 'slope_level_variance'", "a covariance outside what these settings can reach",
                         "must be the saved state of a controller with the same settings"));
   }

@@ -14,6 +14,7 @@ using Mode = SupervisorMode;
 using Reason = SupervisorReason;
 
 constexpr double fast_moves = 8.0;  // so many times the speed of a jam: the plate moves, without waiting for the way
+constexpr double swings = 6.0;      // changes of side: three periods, more than the ringing of a loop that is damped
 constexpr double quick_lag = 1.0 / 3.0;  // of the balance's
 
 const SupervisorSettings& checked(const SupervisorSettings& settings) {
@@ -156,6 +157,26 @@ void ThrottleSupervisor::look_for_spring(double known) noexcept {
   if (s.evidence_s >= set.spring_evidence_s) raise(Mode::limp_home, Reason::spring_lost);
 }
 
+// A loop at its limit: the error changes sides, again and again, under a reference that stands.
+void ThrottleSupervisor::look_for_oscillation(double error) noexcept {
+  const SupervisorSettings& set = settings_;
+  State& s = state_;
+  s.on_side += 1.0;
+  if (std::abs(usable_reference_deg() - s.stands_deg) > set.oscillation_deg) {
+    s.stands_deg = usable_reference_deg();
+    s.error_side = s.side_changes = 0.0;
+  }
+  if (lasted(s.on_side, set.sample_s, set.oscillation_s)) s.side_changes = 0.0;
+  if (!(std::abs(error) > set.oscillation_deg)) return;
+  const double side = std::copysign(1.0, error);
+  if (side == -s.error_side) {
+    s.side_changes += 1.0;
+    s.on_side = 0.0;
+  }
+  s.error_side = side;
+  if (s.side_changes >= swings) raise(Mode::limp_home, Reason::oscillation);
+}
+
 void ThrottleSupervisor::look_at_motion() noexcept {
   const SupervisorSettings& set = settings_;
   State& s = state_;
@@ -163,7 +184,7 @@ void ThrottleSupervisor::look_at_motion() noexcept {
     s.filtering = false;
     for (const Count which : {jam, too_far_closed, too_far_open, overload})
       s.counts[which] = 0.0;
-    s.imbalance = s.evidence_s = 0.0;
+    s.imbalance = s.evidence_s = s.error_side = s.side_changes = 0.0;
     return;
   }
   const double duty = s.order.duty * s.supply_v / set.nominal_supply_v;
@@ -179,6 +200,7 @@ void ThrottleSupervisor::look_at_motion() noexcept {
   const double error = usable_reference_deg() - s.angle_deg;
   for (const auto& [side, beyond] : {std::pair{too_far_closed, error}, std::pair{too_far_open, -error}})
     (void)raise_after(side, beyond > set.tracking_error_deg, set.tracking_s, Mode::limp_home, Reason::tracking);
+  look_for_oscillation(error);
   const bool away =
       s.angle_deg > set.plate.closed_deg + set.jam_error_deg && s.angle_deg < set.plate.open_deg - set.jam_error_deg;
   (void)raise_after(overload, away && std::abs(s.order.duty) > set.overload_duty, set.overload_s, Mode::limp_home,

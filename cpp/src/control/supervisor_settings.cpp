@@ -52,6 +52,9 @@ constexpr auto supervisor_table = joined(
         field<&Sv::overload_duty>(
             {"overload_duty", "-", above(0.0, 1.0), "duty that must not last away from the stops"}),
         field<&Sv::overload_s>({"overload_s", "s", time, "time that it lasts: open"}),
+        field<&Sv::oscillation_deg>(
+            {"oscillation_deg", "deg", width, "error whose side must not change again and again"}),
+        field<&Sv::oscillation_s>({"oscillation_s", "s", time, "longest time between these changes: open"}),
         field<&Sv::limp_home_band_deg>({"limp_home_band_deg", "deg", width, "the plate is at limp-home so near to it"}),
         field<&Sv::return_s>({"return_s", "s", time, "time in which the springs must bring it there"}),
         field<&Sv::healthy_s>({"healthy_s", "s", time, "time without any reason before an acknowledgement counts"}),

@@ -447,7 +447,7 @@ class GuidedPredictive:
     noise_deg : float
         Standard deviation of the measured angle [deg]: what counts as motion.
     learning_rate_per_s, gain_weight, damping_weight : float
-        Learning: share of what explains an innovation, per time [1/s], and the first variances of the factors of gain and
+        Learning: share of what explains an innovation, per time [1/s] of a sample up to 1 ms, and the first variances of the factors of gain and
         damping over that of a friction level [-].
     level_memory_s, memory_s : float
         Time of sliding after which a friction level, and gain and damping, are as uncertain as at first [s].
@@ -466,6 +466,9 @@ class GuidedPredictive:
         How the prediction knows its side of limp-home.
     delay_samples : int
         From a duty to its effect, beside the electrical lag: 0 to 20.
+    delay_search_samples : int
+        With learning: longer delays, by 1 to so many samples, that are tried against the readings beside the given one; 0
+        for none, 6 at most.
     move_steps : sequence of three int
         Prediction steps for which each duty of the horizon is held; together at most 64.
     gauss_newton_steps : int
@@ -514,7 +517,7 @@ class GuidedPredictive:
         """
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
-    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 34549.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, level_memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, rollback_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.5, rollback_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, certify_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 34549.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, level_memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, rollback_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.5, rollback_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, certify_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, delay_search_samples: typing.SupportsInt | typing.SupportsIndex = 6, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
         """
         sample_s : time between samples [s]
         gain_deg_per_s2 : acceleration per duty [degree/second²]
@@ -559,6 +562,7 @@ class GuidedPredictive:
         prediction : what the horizon is predicted with
         switching : how it knows its side of limp-home
         delay_samples : from a duty to its effect
+        delay_search_samples : by which the delay may be longer than stated
         move_steps : prediction steps for which each duty is held
         gauss_newton_steps : at most, per sample
         friction_learning : learn friction levels and gain
@@ -601,6 +605,11 @@ class GuidedPredictive:
     def certified(self) -> dict[str, float]:
         """
         The last belief that predicted well for `certify_s`, like `learnt`: a worse one is rolled back to it.
+        """
+    @property
+    def delay_found_samples(self) -> int:
+        """
+        Samples from a duty to its effect by which the plate is predicted now: `delay_samples` until the readings speak for more.
         """
     @property
     def duty(self) -> float:
@@ -684,6 +693,8 @@ class ThrottleSupervisor:
         Error [deg] that must not last [s].
     overload_duty, overload_s : float
         Duty [-] that must not last away from the stops [s].
+    oscillation_deg, oscillation_s : float
+        Error [deg] whose side must not change six times in a row, each within that time [s], while the reference stands.
     limp_home_band_deg, return_s : float
         The plate is at limp-home so near to it [deg], and must be after that time with the bridge open [s].
     healthy_s : float
@@ -702,8 +713,8 @@ class ThrottleSupervisor:
     Notes
     -----
     Reasons: ``missing_reference``, ``reference_range``, ``missing_sample``, ``stale_sample``, ``sensor_range``,
-    ``sensor_disagreement``, ``invalid_duty``, ``supply_low``, ``supply_lost``, ``jammed``, ``spring_lost``, ``tracking``
-    and ``overload``; ``none`` while nothing was wrong since the last acknowledgement.
+    ``sensor_disagreement``, ``invalid_duty``, ``supply_low``, ``supply_lost``, ``jammed``, ``spring_lost``, ``tracking``,
+    ``overload`` and ``oscillation``; ``none`` while nothing was wrong since the last acknowledgement.
     
     References
     ----------
@@ -732,7 +743,7 @@ class ThrottleSupervisor:
         """
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
-    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, limited_open_deg: typing.SupportsFloat | typing.SupportsIndex = 40.0, late_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, silence_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, range_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, disagreement_deg: typing.SupportsFloat | typing.SupportsIndex = 4.5, sensor_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, nominal_supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, supply_low_v: typing.SupportsFloat | typing.SupportsIndex = 9.0, supply_lost_v: typing.SupportsFloat | typing.SupportsIndex = 6.0, supply_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.098, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.3, load: typing.SupportsFloat | typing.SupportsIndex = 0.04, jam_error_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, jam_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, jam_s: typing.SupportsFloat | typing.SupportsIndex = 0.04, balance_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.006, spring_band_deg: typing.SupportsFloat | typing.SupportsIndex = 3.0, spring_evidence_s: typing.SupportsFloat | typing.SupportsIndex = 0.0004, tracking_error_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, tracking_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, overload_duty: typing.SupportsFloat | typing.SupportsIndex = 0.9, overload_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, limp_home_band_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0, return_s: typing.SupportsFloat | typing.SupportsIndex = 0.4, healthy_s: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> None:
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, limited_open_deg: typing.SupportsFloat | typing.SupportsIndex = 40.0, late_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, silence_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, range_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, disagreement_deg: typing.SupportsFloat | typing.SupportsIndex = 4.5, sensor_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, nominal_supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, supply_low_v: typing.SupportsFloat | typing.SupportsIndex = 9.0, supply_lost_v: typing.SupportsFloat | typing.SupportsIndex = 6.0, supply_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.098, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.3, load: typing.SupportsFloat | typing.SupportsIndex = 0.04, jam_error_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, jam_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, jam_s: typing.SupportsFloat | typing.SupportsIndex = 0.04, balance_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.006, spring_band_deg: typing.SupportsFloat | typing.SupportsIndex = 3.0, spring_evidence_s: typing.SupportsFloat | typing.SupportsIndex = 0.0004, tracking_error_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, tracking_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, overload_duty: typing.SupportsFloat | typing.SupportsIndex = 0.9, overload_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, oscillation_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0, oscillation_s: typing.SupportsFloat | typing.SupportsIndex = 0.15, limp_home_band_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0, return_s: typing.SupportsFloat | typing.SupportsIndex = 0.4, healthy_s: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> None:
         """
         sample_s : time between samples [s]
         closed_deg : lower end of the travel [deg]
@@ -768,6 +779,8 @@ class ThrottleSupervisor:
         tracking_s : time that it lasts: open [s]
         overload_duty : duty that must not last away from the stops
         overload_s : time that it lasts: open [s]
+        oscillation_deg : error whose side must not change again and again [deg]
+        oscillation_s : longest time between these changes: open [s]
         limp_home_band_deg : the plate is at limp-home so near to it [deg]
         return_s : time in which the springs must bring it there [s]
         healthy_s : time without any reason before an acknowledgement counts [s]

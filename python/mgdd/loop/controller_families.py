@@ -149,9 +149,11 @@ def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) 
     if "bias_rate_per_deg_s" in settings:
         most = _MOST_BIAS / (groups.plate.gain_deg_per_s2 * setup.sample_s**3)
         settings["bias_rate_per_deg_s"] = min(settings["bias_rate_per_deg_s"], most)
+    step_s = max(_PREDICTION_STEP_S, setup.sample_s)  # a move cannot be shorter than a sample
+    settings["duty_change_weight"] *= (step_s / _PREDICTION_STEP_S) ** 4  # as the squared way that a duty makes in it
     return GuidedPredictive(
         sample_s=setup.sample_s,
-        prediction_step_s=max(_PREDICTION_STEP_S, setup.sample_s),  # a move cannot be shorter than a sample
+        prediction_step_s=step_s,
         delay_samples=setup.delay_samples,
         noise_deg=max(setup.noise_deg, _CONVERTER_DEG),
         **groups.plate.to_dict(),

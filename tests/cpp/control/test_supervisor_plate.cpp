@@ -154,6 +154,41 @@ TEST(SupervisorOfThePlate, ALastingErrorAndALastingLargeDutyOpen) {
   EXPECT_EQ(load(83.0), -1);
 }
 
+/// Samples until a plate that swings about 40 deg opens the bridge; the reference moves by `way_deg` every `moves`.
+int swings(double half_deg, double period_s, double way_deg = 0.0, int moves = 1) {
+  ThrottleSupervisor s(lively());
+  settle(s, 40.0);
+  for (int k = 1; k <= 2000; ++k) {
+    const double reference = 40.0 + (k / moves % 2 == 1 ? way_deg : 0.0);
+    const double angle = reference + half_deg * std::sin(2.0 * 3.141592653589793 * 1e-3 * k / period_s);
+    if (hold(s, at(angle, reference)).bridge_open) {
+      EXPECT_EQ(s.order().reason, Reason::oscillation);
+      return k;
+    }
+  }
+  return -1;
+}
+
+TEST(SupervisorOfThePlate, ALoopThatSwingsOpensAndOneThatRingsHuntsOrFollowsDoesNot) {
+  const int quick = swings(2.5, 0.08);  // six changes of side: between three and four periods
+  EXPECT_GT(quick, 240);
+  EXPECT_LT(quick, 320);
+  EXPECT_GT(swings(1.3, 0.28), 840);
+  EXPECT_EQ(swings(0.9, 0.08), -1);               // inside `oscillation_deg`
+  EXPECT_EQ(swings(2.5, 0.32), -1);               // 160 ms a side
+  EXPECT_EQ(swings(2.5, 0.08, 5.0, 200), -1);     // the reference moves before three periods are over
+  EXPECT_EQ(swings(2.5, 0.08, 0.7, 200), quick);  // and may tremble
+}
+
+TEST(SupervisorOfThePlate, ADampedRingingIsNoSwing) {
+  ThrottleSupervisor s(lively());
+  settle(s, 40.0);
+  for (int k = 0; k < 1500; ++k) {
+    const double t = 1e-3 * k;
+    ASSERT_FALSE(hold(s, at(50.0 - 10.0 * std::exp(-t / 0.04) * std::cos(80.0 * t), 50.0)).bridge_open) << k;
+  }
+}
+
 TEST(SupervisorOfThePlate, AnOpenBridgeIsAcknowledgedAtLimpHomeOnly) {
   ThrottleSupervisor s(lively());
   settle(s, 40.0);

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from independent_throttle import FAMILIES, SAMPLE_S, Bench, Body
 
+_UNSURE = (
+    "tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "beta_below_duty", "kappa_above_duty_per_deg",
+    "kappa_below_duty_per_deg", "delta_duty",
+)  # fmt: skip
 Log = tuple[np.ndarray, np.ndarray, np.ndarray]  # time [s], duty as commanded [-], measured angle [deg]
 
 
@@ -52,6 +57,32 @@ def draw_body(family: str, seed: int) -> Body:
         delay_samples=seed % 4,
         noise_deg=rng.uniform(0.02, 0.05),
     )
+
+
+class BodyPlate:
+    """A body as a plant of one's own; its delay is the loop's."""
+
+    def __init__(self, body: Body, angle_deg: float | None = None, *, milliseconds: int = 1) -> None:
+        self._bench = Bench(replace(body, delay_samples=0), angle_deg=angle_deg)
+        self._milliseconds = milliseconds
+
+    @property
+    def output(self) -> float:
+        """Angle now [deg]."""
+        return self._bench.angle_deg
+
+    def step(self, duty: float) -> None:
+        """Let a duty act for one sample."""
+        for _ in range(self._milliseconds):
+            self._bench.sample(duty)
+
+
+def known_of(body: Body, seed: int, *, spread: float = 0.2) -> dict[str, float]:
+    """Draw what a controller knows of a body: its groups, each within a share of the truth."""
+    rng = np.random.default_rng([seed, 77])
+    shares = {name: 1.0 + rng.uniform(-spread, spread) for name in _UNSURE}
+    known = {name: value * shares.get(name, 1.0) for name, value in body.groups().items()}
+    return known | {"ramp_deg": body.ramp_deg, "delay_samples": float(body.delay_samples)}
 
 
 def forty_bodies() -> list[Body]:

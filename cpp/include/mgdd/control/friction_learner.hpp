@@ -21,8 +21,11 @@ inline constexpr double largest_damping_factor = 2.5;
 /// Duty beyond the friction level, or taken by the speed, from which gain and damping are learnt.
 inline constexpr double least_excitation = 0.08;
 
+/// A sample that lasts longer teaches no more: one innovation says what it says, however long it took.
+inline constexpr double longest_lesson_s = 1e-3;
+
 struct FrictionLearnerSettings {
-  double rate_per_s = 150.0;     ///< share of what explains an innovation that is learnt, per time
+  double rate_per_s = 150.0;     ///< share of what explains an innovation that is learnt, per time up to 1 ms
   double gain_weight = 36.0;     ///< variance of the gain factor at the start, over that of a level in duty
   double damping_weight = 36.0;  ///< of the damping factor
   double level_memory_s = 0.01;  ///< time of sliding after which a level is as uncertain as at the start
@@ -47,7 +50,7 @@ class FrictionLearner {
   /// `angle_share` and `speed_gain` of the observer's correction; `noise_deg` of the measured angle bounds a step.
   FrictionLearner(const FrictionLearnerSettings& s, const Plate& plate, double sample_s, double noise_deg,
                   T angle_share, T speed_gain) noexcept
-      : rate_(T(std::fmin(s.rate_per_s * sample_s, 1.0))),
+      : rate_(T(std::fmin(s.rate_per_s * std::fmin(sample_s, longest_lesson_s), 1.0))),
         prior_{T(1.0), T(s.gain_weight), T(s.damping_weight)},
         level_fades_(T(std::fmin(sample_s / s.level_memory_s, 1.0))),
         fades_(T(std::fmin(sample_s / s.memory_s, 1.0))),

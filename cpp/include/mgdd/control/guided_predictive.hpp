@@ -16,9 +16,11 @@
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/belief_review.hpp"
+#include "mgdd/control/delay_bank.hpp"
 #include "mgdd/control/filtered_rate.hpp"
 #include "mgdd/control/guided_horizon.hpp"
 #include "mgdd/control/guided_predictive_settings.hpp"
+#include "mgdd/control/plate_observer.hpp"
 #include "mgdd/control/sent_duties.hpp"
 
 namespace mgdd::control {
@@ -48,7 +50,7 @@ class BasicGuidedPredictive {
   void take_over(T measurement_deg, T duty) noexcept;
 
   /// What was learnt, and a start from it. ParameterError for levels that learning could not have reached.
-  const PlateBelief<T>& belief() const noexcept { return belief_; }
+  const PlateBelief<T>& belief() const noexcept { return now().belief; }
   void set_belief(const PlateBelief<T>& belief);
   /// The last belief that predicted well for long, to which a worse one is rolled back; how often that was.
   const PlateBelief<T>& certified() const noexcept { return proven_.belief(); }
@@ -56,8 +58,11 @@ class BasicGuidedPredictive {
 
   const GuidedPredictiveSettings& settings() const noexcept { return settings_; }
   T duty() const noexcept { return duty_; }
-  T innovation_deg() const noexcept { return innovation_; }  ///< measured less predicted angle of the last sample
-  bool holds() const noexcept { return holds_; }             ///< whether the plate is held where it is stuck
+  T innovation_deg() const noexcept { return now().innovation; }  ///< measured less predicted angle of the last sample
+  bool holds() const noexcept { return holds_; }                  ///< whether the plate is held where it is stuck
+
+  /// Samples from a duty to its effect as the readings have them; `delay_samples` until they say otherwise.
+  int delay_samples() const noexcept { return settings_.delay_samples + bank_.chosen(); }
 
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const;
@@ -69,11 +74,10 @@ class BasicGuidedPredictive {
     v("holds", self.holds_);
     v("above_limp_home", self.above_);
     v("still_samples", self.still_, counts_end);
-    visit_number(v, "angle_deg", self.state_.angle_deg);
-    visit_number(v, "speed_deg_per_s", self.state_.speed_deg_per_s);
-    visit_number(v, "torque", self.state_.torque);
-    visit_number(v, "mean_torque", self.mean_torque_);
-    visit_belief(self.belief_, v);
+    PlateObserver<T>::visit(self.members_[0], v);
+    for (std::size_t j = 1; j < most_delays; ++j)
+      PlateObserver<T>::visit(self.members_[j], Prefixed<V>{v, names_of_members[j]});
+    DelayBank<T>::visit(self.bank_, Prefixed<V>{v, "delay_"});
     auto certified = self.proven_.belief();
     visit_belief(certified, Prefixed<V>{v, "certified_"});
     if constexpr (!std::is_const_v<Self>) self.proven_.believe(certified);
@@ -82,12 +86,10 @@ class BasicGuidedPredictive {
     visit_number(v, "certified_torque", self.proven_state_.torque);
     BeliefReview<T>::visit(self.review_, Prefixed<V>{v, "review_"});
     v("rollbacks", self.rollbacks_, counts_end);
-    FrictionLearner<T>::visit(self.learner_, Prefixed<V>{v, "slope_"});
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
     visit_sent(self.sent_, v);
     for (std::size_t i = 0; i < self.moves_.size(); ++i)
       visit_number(v, names_of_moves[i], self.moves_[i]);
-    visit_number(v, "innovation_deg", self.innovation_);
     visit_number(v, "mean_error_deg", self.mean_error_);
     visit_number(v, "trim", self.trim_);
     visit_number(v, "duty", self.duty_);
@@ -96,44 +98,40 @@ class BasicGuidedPredictive {
  private:
   static constexpr std::size_t n = n_guided_moves;
   static constexpr std::array<const char*, n> names_of_moves{"move_0", "move_1", "move_2"};
-  template <class B, class V>
-  static void visit_belief(B& belief, V&& v) {
-    visit_number(v, "bias_above", belief.above.bias);
-    visit_number(v, "friction_above", belief.above.friction);
-    visit_number(v, "bias_below", belief.below.bias);
-    visit_number(v, "friction_below", belief.below.friction);
-    visit_number(v, "gain_factor", belief.gain_factor);
-    visit_number(v, "damping_factor", belief.damping_factor);
-  }
+  static constexpr std::array<const char*, most_delays> names_of_members{"",        "late_1_", "late_2_", "late_3_",
+                                                                         "late_4_", "late_5_", "late_6_"};
   void start(T angle_deg, T duty) noexcept;
   void correct(T measurement_deg) noexcept;
-  T corrected(PlateState<T>& state, T measurement_deg) noexcept;
   bool review(T innovation, bool slides) noexcept;
   void look_ahead(T measurement_deg, std::span<const T> preview_deg) noexcept;
   bool hold_still() noexcept;
   void break_away() noexcept;
   T send() noexcept;
   bool gauss_newton() noexcept { return gauss_newton_step(predicted_, settings_, horizon_, moves_); }
-  FrictionBand<T>& band_at(T angle_deg) noexcept;
+  const PlateObserver<T>& now() const noexcept { return members_[static_cast<std::size_t>(bank_.chosen())]; }
+  PlateObserver<T>& now() noexcept { return members_[static_cast<std::size_t>(bank_.chosen())]; }
+  std::span<PlateObserver<T>> members() noexcept {
+    return std::span(members_).first(static_cast<std::size_t>(bank_.members()));
+  }
 
   GuidedPredictiveSettings settings_;
-  PlateModel<T> observed_;   // one sample at a time
+  PlateModel<T> observed_;   // one sample at a time, with the belief of whom it steps
   PlateModel<T> predicted_;  // one prediction step at a time
   PlateModel<T> proven_;     // `observed_` with the certified belief
-  T angle_share_, speed_gain_, slow_;
-  FrictionLearner<T> learner_;
+  PlateCorrection<T> gains_;
+  T slow_;
+  DelayBank<T> bank_;
+  std::array<PlateObserver<T>, most_delays> members_;  // of the delay that is given and the longer ones
   BeliefReview<T> review_;
 
   bool started_ = false, prepared_ = false, holds_ = false, above_ = true;
   std::int64_t still_ = 0;
-  PlateState<T> state_{}, proven_state_{};
-  T mean_torque_{0.0};
-  PlateBelief<T> belief_{};
+  PlateState<T> proven_state_{};
   FilteredRate<T> reference_;
   SentDuties<T> sent_{};  // duties without trim
   GuidedMoves<T> moves_{};
   std::int64_t rollbacks_ = 0;
-  T innovation_{0.0}, mean_error_{0.0}, trim_{0.0}, duty_{0.0};
+  T mean_error_{0.0}, trim_{0.0}, duty_{0.0};
   GuidedHorizon<T> horizon_{};  // of the last sample, for `refine`
 };
 

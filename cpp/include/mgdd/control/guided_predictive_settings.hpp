@@ -10,6 +10,7 @@
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
 #include "mgdd/control/belief_review.hpp"
+#include "mgdd/control/delay_bank.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/friction_learner.hpp"
 #include "mgdd/control/plate_model.hpp"
@@ -34,8 +35,9 @@ enum class SideSwitching {
 
 struct GuidedPredictiveSettings {
   double sample_s = 1e-3;
-  Plate plate{};          ///< the guide
-  int delay_samples = 1;  ///< from a duty to its effect, beside the electrical lag: 0 to `longest_control_delay`
+  Plate plate{};                 ///< the guide
+  int delay_samples = 1;         ///< from a duty to its effect, beside the electrical lag: 0 to `longest_control_delay`
+  int delay_search_samples = 6;  ///< longer delays among which the readings choose, with learning; 0: none
 
   // The horizon.
   Prediction prediction = Prediction::nonlinear;
@@ -83,6 +85,8 @@ inline auto fields_of(const GuidedPredictiveSettings&) {
       field<&S::prediction>("prediction", "what the horizon is predicted with"),
       field<&S::switching>("switching", "how it knows its side of limp-home"),
       field<&S::delay_samples>({"delay_samples", "-", closed(0.0, longest_control_delay), "from a duty to its effect"}),
+      field<&S::delay_search_samples>(
+          {"delay_search_samples", "-", closed(0.0, most_delays - 1), "by which the delay may be longer than stated"}),
       field<&S::move_steps>("move_steps", "prediction steps for which each duty is held"),
       field<&S::gauss_newton_steps>({"gauss_newton_steps", "-", closed(1.0, 100.0), "at most, per sample"}),
       field<&S::friction_learning>("friction_learning", "learn friction levels and gain")};

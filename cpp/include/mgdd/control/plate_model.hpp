@@ -130,8 +130,9 @@ class PlateModel {
     const auto spring = dynamics::limp_home_spring(x, c_.above, c_.below, c_.over_ramp);
     return spring.elastic + spring.preload;
   }
+  bool is_below(const T& angle_deg) const noexcept { return angle_deg < T(c_.limp_home); }
   const FrictionBand<C>& band_at(const T& angle_deg) const noexcept {
-    return angle_deg < T(c_.limp_home) ? belief_.below : belief_.above;
+    return is_below(angle_deg) ? belief_.below : belief_.above;
   }
   /// Held duty at which the plate would begin to move from an angle, were it at rest there.
   dynamics::Breakaway<T> breakaway(const State& s) const noexcept {

@@ -44,6 +44,7 @@ enum class SupervisorReason {
   spring_lost,  ///< the plate does not return under a duty that its spring would beat
   tracking,     ///< the error stays large
   overload,     ///< the duty stays large
+  oscillation,  ///< the plate swings about a reference that stands
 };
 
 /// Default-spring test: whether the plate is at limp-home with the bridge open.
@@ -87,6 +88,8 @@ struct SupervisorSettings {
   double tracking_s = 0.5;
   double overload_duty = 0.9;
   double overload_s = 1.0;
+  double oscillation_deg = 1.0;  ///< of the error on either side, and what a reference may move that stands
+  double oscillation_s = 0.15;   ///< between two sides: hunting by friction and integral is slower
 
   // With the bridge open.
   double limp_home_band_deg = 1.0;
@@ -176,6 +179,10 @@ class ThrottleSupervisor {
     v("imbalance", s.imbalance);
     v("evidence_s", s.evidence_s);
     v("last_deg", s.last_deg);
+    v("stands_deg", s.stands_deg);
+    v("error_side", s.error_side);
+    v("side_changes", s.side_changes);
+    v("samples_on_side", s.on_side);
   }
 
  private:
@@ -216,6 +223,8 @@ class ThrottleSupervisor {
     double last_deg = 0.0;
     double imbalance = 0.0, motion = 0.0;  // what is not explained, and what inertia and back-EMF explain
     double evidence_s = 0.0;
+    double stands_deg = 0.0;  // the reference since it moved
+    double error_side = 0.0, side_changes = 0.0, on_side = 0.0;
   };
 
   void raise(SupervisorMode mode, SupervisorReason reason) noexcept;
@@ -228,6 +237,7 @@ class ThrottleSupervisor {
   void follow_balance(double excess) noexcept;
   bool look_for_jam(double duty, double excess, double friction, double known) noexcept;
   void look_for_spring(double known) noexcept;
+  void look_for_oscillation(double error) noexcept;
   void test_return() noexcept;
 
   SupervisorSettings settings_;
