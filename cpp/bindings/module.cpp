@@ -50,7 +50,6 @@ PYBIND11_MODULE(_core, m) {
       {"guide",
        "Models that guide a seeker: feed-forward, curves, trust.",
        {&bind_curve, &bind_feed_forward, &bind_model_optimum, &bind_online_calibration, &bind_guided_engine}},
-      {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop",
        "Virtual benches and the loops over them.",
        {&bind_virtual_engine, &bind_function_plant, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop,

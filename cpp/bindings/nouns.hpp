@@ -34,7 +34,6 @@ void bind_online(pybind11::module_& m);
 void bind_feed_forward(pybind11::module_& m);
 void bind_model_optimum(pybind11::module_& m);
 void bind_online_calibration(pybind11::module_& m);
-void bind_benchmark_models(pybind11::module_& m);
 void bind_curve(pybind11::module_& m);
 void bind_guided_engine(pybind11::module_& m);
 void bind_virtual_engine(pybind11::module_& m);

@@ -29,8 +29,8 @@ from mgdd.signals import chirp
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.fit import random_step_records
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, simulate_throttle
-from mgdd_studies.benchmarks.drive_axis import DriveModel
-from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
+from mgdd_studies.benchmarks.drive_axis import slide_model
+from mgdd_studies.benchmarks.wiener_hammerstein import LinearFilter
 
 
 def objects() -> dict[str, Callable[[], Any]]:
@@ -73,10 +73,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "pw_p": lambda: PseudoWiener("pw_p", {"plays": 8.0}),
         "first principle": FirstPrincipleModel,
         "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, initial_state=(0.0,)),
-        "drive": lambda: DriveModel(parameters={"mass_kg": 95.0}, force_n_per_v=35.0),
-        "filter": lambda: LinearApproximation(
-            numerator=np.ones(9), denominator=np.ones(1), input_mean=0.0, output_mean=0.0, rmse=0.0
-        ),
+        "drive": lambda: slide_model({"mass_kg": 95.0}, force_n_per_v=35.0),
+        "filter": lambda: LinearFilter(4).model(np.ones(5), np.ones(5), 0.0, 0.0),
         "surrogate": surrogate,
         "support": lambda: surrogate().support,
         "signal": lambda: surrogate().signals["nox_ppm"],

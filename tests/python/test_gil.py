@@ -232,18 +232,6 @@ def latin_hypercube() -> Call:
     return partial(_core.optimize.latin_hypercube, _core.identify.throttle_group_bounds(), 50_000, 1)
 
 
-@batch
-def digital_filter() -> Call:
-    return partial(_core.systems.filter_series, np.ones(4), np.array([1.0, -0.5]), np.ones(MANY))
-
-
-@batch
-def tanks() -> Call:
-    values = [0.05, 0.05, 0.5, 0.05, 0.5, 0.0, 10.0, 0.5, 0.0]
-    model = _core.systems.TwoTanks(lower_brim_v=10.0)
-    return partial(model.free_run, parameters=values, start=[1.0, 1.0, 2.0, 2.0], input=np.full(SOME, 2.0), dt_s=1.0)
-
-
 def steps_meanwhile(call: Call) -> tuple[int, float]:
     """How often another thread got on while the call ran, and how long that took [s]."""
     ticks, stop = [], threading.Event()

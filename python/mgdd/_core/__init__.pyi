@@ -9,10 +9,9 @@ from . import engine
 from . import throttle
 from . import identify
 from . import guide
-from . import systems
 from . import loop
 from . import rig
-__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'instruction_set', 'loop', 'math', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'instruction_set', 'loop', 'math', 'optimize', 'processor_simd_levels', 'rig', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.

@@ -1,7 +1,8 @@
 """Identification: fitting models to measured records, and which parameters the data do not identify.
 
 Engine: `fit_cylinder`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
-`validate_throttle` and the fits and excitations below them. Any ODE: `fit_ode`. Every fit answers with a
+`validate_throttle` and the fits and excitations below them. Models of the
+user's own: `fit_ode`, `fit_model`. Every fit answers with a
 `mgdd.results.Fit`.
 """
 
@@ -13,8 +14,10 @@ from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.family import ModelFamily
 from mgdd.identify.engine.profile import wall_heat_profile
 from mgdd.identify.engine.tdc import estimate_tdc
-from mgdd.identify.ode import fit_ode
-from mgdd.identify.ode_model import OdeModel
+from mgdd.identify.grey_box.fit import fit_model
+from mgdd.identify.grey_box.models import DiscreteModel, OdeModel, SimulatorModel
+from mgdd.identify.grey_box.ode import fit_ode
+from mgdd.identify.grey_box.profile import profile_likelihood
 from mgdd.identify.throttle.excitation import check_excitation, design_excitation
 from mgdd.identify.throttle.fits import load_throttle_model
 from mgdd.identify.throttle.identify import identify_throttle
@@ -22,8 +25,9 @@ from mgdd.identify.throttle.online_update import OnlineUpdate
 from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
-    "ModelFamily", "OdeModel", "OnlineUpdate", "best_timing", "check_excitation", "design_excitation", "estimate_tdc",
-    "fit_cylinder", "fit_ode", "identify_throttle", "load_throttle_model", "validate_throttle", "wall_heat_profile",
+    "DiscreteModel", "ModelFamily", "OdeModel", "OnlineUpdate", "SimulatorModel", "best_timing", "check_excitation",
+    "design_excitation", "estimate_tdc", "fit_cylinder", "fit_model", "fit_ode", "identify_throttle",
+    "load_throttle_model", "profile_likelihood", "validate_throttle", "wall_heat_profile",
 ]  # fmt: skip
 
 _furnish(__name__)

@@ -30,7 +30,7 @@ class RunInputs(NamedTuple):
 
 
 class SampledModel(ABC):
-    """A model of one output: a kind gives names, labels and `_run`, and has `simulate` and `predict` of this class."""
+    """A model with sampled inputs: a kind gives names, labels and `_run`, and has `simulate` and `predict` of this."""
 
     input_names: tuple[str, ...]
     output_name: str
@@ -38,9 +38,14 @@ class SampledModel(ABC):
     observed_state: str | None = None  # the state that a measured output shows
     labels: ClassVar[Mapping[str, Label]] = MappingProxyType({})
 
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Outputs in the order of `_run`."""
+        return (self.output_name,)
+
     @abstractmethod
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
-        """Return the output on every sample."""
+        """Return the output on every sample, (n,), or (n, outputs) of several."""
 
     @abstractmethod
     def _rest(self) -> list[float]:
@@ -64,7 +69,7 @@ class SampledModel(ABC):
         Returns
         -------
         xarray.Dataset
-            Inputs and output over ``time_s``.
+            Inputs and outputs over ``time_s``.
 
         Raises
         ------
@@ -77,7 +82,8 @@ class SampledModel(ABC):
         """
         time, *columns = columns_of(inputs, ("time_s", *self.input_names))
         run = self._run(RunInputs(time, even_step(time), columns, self.state_of(initial_state)))
-        return self._labelled(time, {**dict(zip(self.input_names, columns, strict=True)), self.output_name: run})
+        outputs = zip(self.output_names, run.reshape(time.size, -1).T, strict=True)
+        return self._labelled(time, {**dict(zip(self.input_names, columns, strict=True)), **dict(outputs)})
 
     def predict(self, record: Any, horizon: int) -> xr.Dataset:
         """Predict ahead: the measured output plus the change of the free run over the horizon.
@@ -85,14 +91,14 @@ class SampledModel(ABC):
         Parameters
         ----------
         record : Dataset, DataFrame, mapping of columns, or array_like, shape (n, columns)
-            As `simulate` takes it, and the measured output as the last column.
+            As `simulate` takes it, and the measured outputs as the last columns.
         horizon : int
             Samples ahead, at least 1.
 
         Returns
         -------
         xarray.Dataset
-            The output over ``time_s`` from sample `horizon` on; entry k is predicted from the data up to sample k.
+            The outputs over ``time_s`` from sample `horizon` on; entry k is predicted from the data up to sample k.
 
         Raises
         ------
@@ -101,11 +107,14 @@ class SampledModel(ABC):
         DataError, ShapeError
             As in `simulate`.
         """
-        time, measured = columns_of(record, ("time_s", self.output_name))
-        check_horizon(horizon, measured.size)
-        start = {} if self.observed_state is None else {self.observed_state: float(measured[0])}
-        run = self.simulate(record, initial_state=start)[self.output_name].to_numpy()
-        return self._labelled(time[horizon:], {self.output_name: measured[:-horizon] + run[horizon:] - run[:-horizon]})
+        time, *measured = columns_of(record, ("time_s", *self.output_names))
+        check_horizon(horizon, time.size)
+        start = {} if self.observed_state is None else {self.observed_state: float(measured[0][0])}
+        simulated, ahead = self.simulate(record, initial_state=start), {}
+        for name, column in zip(self.output_names, measured, strict=True):
+            run = simulated[name].to_numpy()
+            ahead[name] = column[:-horizon] + run[horizon:] - run[:-horizon]
+        return self._labelled(time[horizon:], ahead)
 
     def __getstate__(self) -> dict[str, Any]:
         return {key: dict(item) if isinstance(item, MappingProxyType) else item for key, item in vars(self).items()}

@@ -1,107 +1,110 @@
-"""A motor-driven slide with friction, fitted to its open-loop response."""
+"""A motor-driven slide with friction: a model of a few lines, fitted to its open-loop response."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core import systems
 from mgdd.errors import ParameterError
-from mgdd.io.parameters import ModelParameters, wanted
-from mgdd.optimize.least_squares import FitOptions, LeastSquaresOptions, fit_of, fit_options, fit_run
-from mgdd.parallel.finished import hand_over, keep_finished
+from mgdd.identify import DiscreteModel, fit_model
+from mgdd.optimize import FitOptions
 from mgdd.results import Fit
-from mgdd.results.describe import described
-from mgdd.results.fit_report import FitReport
-from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.model import RunInputs, SampledModel
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["DriveModel", "drive_free_run", "drive_inverse_dynamics", "fit_drive"]
+__all__ = ["drive_free_run", "drive_inverse_dynamics", "fit_drive", "slide_model"]
 
 _WINDOW = 20  # samples from which position and speed at the start are taken
+_STRETCH = 3500  # samples of a stretch of multiple shooting, a little more than half a motion cycle
+_NAMES = (
+    "mass_kg", "viscous_ns_per_m", "viscous_asymmetry_ns_per_m", "coulomb_n", "offset_n", "offset_drift_n_per_s",
+    "stribeck_n", "stribeck_speed_m_per_s",
+)  # fmt: skip
+_REST = 1e-3  # least speed of the Stribeck rise [m/s]: the slide leaves it within a few samples
 _FORMS: dict[str, tuple[str, ...]] = {
     "coulomb": ("coulomb_n", "offset_n"),
     "directional": ("coulomb_n", "offset_n", "viscous_asymmetry_ns_per_m"),
     "stiction": ("coulomb_n", "offset_n", "viscous_asymmetry_ns_per_m", "stribeck_n"),
     "stribeck": ("coulomb_n", "offset_n", "viscous_asymmetry_ns_per_m", "stribeck_n", "stribeck_speed_m_per_s"),
 }
-# Of a parameter between starts: relative to it (standard deviation of its logarithm), or in its own unit.
-_RELATIVE = {
-    "mass_kg": 0.08,
-    "viscous_ns_per_m": 0.08,
-    "coulomb_n": 0.08,
-    "stribeck_n": 0.4,
-    "stribeck_speed_m_per_s": 0.4,
-}
-_ABSOLUTE = {"viscous_asymmetry_ns_per_m": 8.0, "offset_n": 0.5, "offset_drift_n_per_s": 0.02}
-_NEAR = 0.25  # of that scatter, for the starts about the best
-_REST = 1e-3  # least speed of the Stribeck rise [m/s]: the slide leaves it within a few samples
 _FILTER_ORDER, _DECIMATION = 4, 10
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class DriveModel(SampledModel, ModelParameters):
-    """A slide with mass, friction and offset, driven by a voltage.
+def slide(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> tuple[Any, Any]:
+    """Step position and speed by a sample under the time and the voltage.
+
+    The force that is left after friction moves the mass; friction at rest is set-valued and solved exactly by a
+    proximal step, so the slide neither chatters nor creeps.
+    """
+    mass, viscous, asymmetry, coulomb, offset, drift, stribeck, stribeck_speed, force_per_v, h = p
+    position, speed = x
+    inertia = mass / h
+    push = inertia * speed + (force_per_v * u[1] - offset - drift * u[0])
+    limit = coulomb + stribeck * np.exp(-np.abs(speed) / stribeck_speed)
+    left = push - np.minimum(np.maximum(push, -limit), limit)
+    speed = left / (inertia + viscous + asymmetry * np.sign(push))
+    return position + h * speed, speed
+
+
+def slide_model(
+    parameters: Mapping[str, float],
+    *,
+    force_n_per_v: float,
+    sample_s: float = 1e-3,
+    initial_state: tuple[float, float] = (0.0, 0.0),
+) -> DiscreteModel:
+    """Make a model of a slide with mass, friction and offset, driven by a voltage.
 
     Parameters
     ----------
     parameters : mapping of str to float
         Names carry the unit: ``mass_kg``, ``viscous_ns_per_m``, ``viscous_asymmetry_ns_per_m`` (added forward, taken
-        off backward), ``coulomb_n``, ``stribeck_n``, ``stribeck_speed_m_per_s``, ``offset_n``,
-        ``offset_drift_n_per_s`` and ``stiffness_n_per_m``; one that is left out is zero.
+        off backward), ``coulomb_n``, ``offset_n``, ``offset_drift_n_per_s``, ``stribeck_n`` and
+        ``stribeck_speed_m_per_s``; one that is left out is zero.
     force_n_per_v : float
         Force of the drive per volt [N/V].
+    sample_s : float
+        Step of the model [s].
+    initial_state : tuple of float
+        Position [m] and speed [m/s] at the first sample.
 
-    Notes
-    -----
-    Inputs are ``time_s`` [s], whose zero is where the drift of the offset starts, and ``drive_v`` [V]; states are
-    ``position_m`` and ``speed_m_per_s``, at rest at 0 without; the output is ``position_m`` [m].
+    Returns
+    -------
+    DiscreteModel
+        From ``time_s`` [s], whose zero is where the drift of the offset starts, and ``drive_v`` [V] to ``position_m``.
+
+    Raises
+    ------
+    ParameterError
+        An unknown parameter.
 
     Examples
     --------
-    >>> from mgdd_studies.benchmarks.drive_axis import DriveModel
-    >>> slide = DriveModel(parameters={"mass_kg": 95.0, "coulomb_n": 20.0}, force_n_per_v=35.0)
+    >>> from mgdd_studies.benchmarks.drive_axis import slide_model
+    >>> slide = slide_model({"mass_kg": 95.0, "coulomb_n": 20.0}, force_n_per_v=35.0)
     >>> run = slide.simulate({"time_s": [0.0, 0.001, 0.002], "drive_v": [0.5, 0.5, 0.5]})
     >>> run["position_m"].values.tolist()  # 17.5 N do not overcome 20 N
     [0.0, 0.0, 0.0]
     """
-
-    kind = "drive"
-    parameter_names = tuple(systems.DriveAxis.parameter_names)
-    settings = MappingProxyType(wanted(("force_n_per_v",)))
-    input_names = ("drive_v",)
-    output_name = observed_state = "position_m"
-    state_names = ("position_m", "speed_m_per_s")
-    labels = MappingProxyType({"drive_v": Label("V", "voltage"), "position_m": Label("m", "position")})
-
-    parameters: Mapping[str, float]
-    force_n_per_v: float
-
-    def _rest(self) -> list[float]:
-        return [0.0, 0.0]
-
-    def _run(self, run: RunInputs) -> NDArray[np.float64]:
-        return np.asarray(
-            systems.DriveAxis(force_n_per_v=self.force_n_per_v).free_run(
-                parameters=_row(self.parameters),
-                start=[*run.state, float(run.time_s[0])],
-                input=run.columns[0],
-                dt_s=run.step_s,
-            )
-        )
-
-    def _written(self) -> Mapping[str, float]:
-        return dict(zip(self.parameter_names, _row(self.parameters), strict=True))
+    fixed = {"force_n_per_v": force_n_per_v, "step_s": sample_s}
+    unknown = [name for name in parameters if name not in (*_NAMES, *fixed)]
+    if unknown:
+        raise ParameterError(f"parameter {unknown[0]!r}: must be one of {', '.join(_NAMES)}")
+    at_rest = {"mass_kg": 1.0, "stribeck_speed_m_per_s": 0.03}
+    values = {name: float(parameters.get(name, at_rest.get(name, 0.0))) for name in _NAMES}
+    return DiscreteModel(
+        step=slide,
+        parameters=values | fixed,
+        initial_state=initial_state,
+        input_names=("time_s", "drive_v"),
+        output_names=("position_m",),
+        sample_s=sample_s,
+    )
 
 
 def drive_inverse_dynamics(
@@ -166,12 +169,12 @@ def drive_start(record: xr.Dataset) -> tuple[float, float]:
     return float(cubic[-1]), float(cubic[-2])
 
 
-def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]:
+def drive_free_run(model: DiscreteModel, record: xr.Dataset) -> NDArray[np.float64]:
     """Simulate a record from the state that its first 20 samples show.
 
     Parameters
     ----------
-    model : DriveModel
+    model : DiscreteModel
         The slide.
     record : xarray.Dataset
         As `fit_drive` takes it; only the first 20 positions are used.
@@ -189,15 +192,14 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
     Examples
     --------
     >>> from mgdd_studies.benchmarks import records
-    >>> from mgdd_studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics
+    >>> from mgdd_studies.benchmarks.drive_axis import drive_free_run, drive_inverse_dynamics, slide_model
     >>> if "emps" in records.names():
     ...     train, test = records.read("emps")
-    ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
+    ...     slide = slide_model(drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
     ...     assert drive_free_run(slide, test).size == 24821
     """
-    position, speed = drive_start(record)
-    later = record.isel(time_s=slice(_WINDOW - 1, None))
-    return model.simulate(later, initial_state=(position, speed))["position_m"].to_numpy()[1:]
+    run = model.simulate(record.isel(time_s=slice(_WINDOW - 1, None)), initial_state=drive_start(record))
+    return run["position_m"].to_numpy()[1:]
 
 
 def fit_drive(
@@ -210,10 +212,8 @@ def fit_drive(
 ) -> Fit:
     """Fit mass and friction of a driven slide to its free run under the measured voltage.
 
-    Output-error fit with exact sensitivities; position and speed at the start come from the first 20 samples, which
-    are left out of the residual. A free run integrates every error of the force, so its cost has a long valley between
-    mass and friction, with many shallow hollows: the search is repeated from starts scattered about the first, then
-    about the best, and the best by the error on this record is taken.
+    The start is linear least squares on the force balance. A free run integrates every error of the force, so its cost
+    has a long valley between mass and friction, with many shallow hollows: multiple shooting crosses them.
 
     Parameters
     ----------
@@ -227,14 +227,14 @@ def fit_drive(
     drift : bool
         Let the offset force drift linearly over the record, as an amplifier does that warms up.
     start_values : mapping of str to float, optional
-        First start, by parameter name; without it the inverse dynamics give it (`drive_inverse_dynamics`).
+        Start, by parameter name; without it the inverse dynamics give it (`drive_inverse_dynamics`).
     options : FitOptions, optional
-        48 starts, scattered with seed 1, 60 trial steps per start and a tolerance of 1e-6 by default.
+        10 trial steps and a tolerance of 1e-5 by default, otherwise as of `mgdd.identify.fit_model`.
 
     Returns
     -------
     mgdd.results.Fit
-        Report [m], model, and the error of every start: how sharply the record points at one answer.
+        Report [m], with position and speed at sample 19, and model.
 
     Raises
     ------
@@ -252,102 +252,57 @@ def fit_drive(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd_studies.benchmarks.drive_axis import DriveModel, fit_drive
-    >>> from mgdd.optimize import FitOptions
+    >>> from mgdd_studies.benchmarks.drive_axis import fit_drive, slide_model
     >>> time = np.arange(4000) * 1e-3
     >>> drive = 2.0 * np.sign(np.sin(4.0 * time)) + 0.5 * np.sin(11.0 * time)
     >>> truth = {"mass_kg": 90.0, "coulomb_n": 21.0, "viscous_ns_per_m": 200.0, "offset_n": 1.0}
-    >>> slide = DriveModel(parameters=truth, force_n_per_v=35.0)
+    >>> slide = slide_model(truth, force_n_per_v=35.0)
     >>> record = slide.simulate({"time_s": time, "drive_v": drive}).assign(force_n_per_v=35.0)
-    >>> options = FitOptions(n_starts=2)
-    >>> fit = fit_drive(
-    ...     record, friction="directional", drift=False, start_values=dict(truth, mass_kg=95.0), options=options)
+    >>> fit = fit_drive(record, friction="directional", drift=False, start_values=dict(truth, mass_kg=95.0))
     >>> round(fit.model.parameters["mass_kg"])
     90
     """
     if friction not in _FORMS:
         raise ParameterError.of("friction", friction, f"one of {', '.join(_FORMS)}")
-    chosen = fit_options(options, n_starts=48, seed=1, max_iterations=60, tolerance=1e-6)
-    starts = chosen.n_starts
-    names = tuple(systems.DriveAxis.parameter_names)
-    free = ["mass_kg", "viscous_ns_per_m", *_FORMS[friction]]
-    free += ["offset_drift_n_per_s"] if drift else []
-    first = _core_record(record)
-    dt_s = even_step(record["time_s"])
-    axis = systems.DriveAxis(force_n_per_v=float(record["force_n_per_v"]))
-    search = LeastSquaresOptions(max_iterations=chosen.max_iterations, cost_tolerance=chosen.tolerance)
-    base = dict(drive_inverse_dynamics(record) if start_values is None else start_values)
+    given = options or FitOptions()
+    chosen = FitOptions(
+        n_starts=given.n_starts,
+        seed=given.seed,
+        max_iterations=given.max_iterations or 10,
+        tolerance=given.tolerance or 1e-5,
+    )
+    start = dict(drive_inverse_dynamics(record) if start_values is None else start_values)
     if friction == "coulomb":
-        base["viscous_asymmetry_ns_per_m"] = 0.0
-    elif friction == "stribeck":
-        base.setdefault("stribeck_n", 2.0)
-    elif friction == "stiction":
-        base.setdefault("stribeck_n", 10.0)
-        base["stribeck_speed_m_per_s"] = _REST
-    base = dict(zip(names, _row(base), strict=True))
-    rng = np.random.default_rng(chosen.seed)
-    measured = record["position_m"].to_numpy()[_WINDOW:]
-    found: list[systems.FreeRunFit] = []
-
-    def points() -> Iterator[dict[str, float]]:
-        yield base
-        for index in range(1, starts):
-            if index < (starts + 5) // 6:
-                yield _scattered(base, free, 1.0, rng)
-            else:
-                near = min(found, key=_cost).parameters
-                yield _scattered(dict(zip(names, near, strict=True)), free, _NEAR, rng)
-
-    stop = keep_finished(
-        lambda point: axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=search),
-        points(),
-        found,
+        start["viscous_asymmetry_ns_per_m"] = 0.0
+    elif friction in ("stribeck", "stiction"):
+        start.setdefault("stribeck_n", 2.0)
+        start["stribeck_speed_m_per_s"] = 0.03 if friction == "stribeck" else _REST
+    later = record.isel(time_s=slice(_WINDOW - 1, None))
+    model = slide_model(
+        start,
+        force_n_per_v=float(record["force_n_per_v"]),
+        sample_s=even_step(record["time_s"]),
+        initial_state=drive_start(record),
     )
-    best = min(found, key=_cost)
-    errors = [float(np.sqrt(2.0 * _cost(one) / measured.size)) for one in found]
-    model = DriveModel(
-        parameters=dict(zip(names, best.parameters, strict=True)), force_n_per_v=float(record["force_n_per_v"])
-    )
-    report = FitReport.from_core(best.report, measured)
-    run = fit_run(
-        record["time_s"].to_numpy()[_WINDOW:], measured, drive_free_run(model, record), model.labels["position_m"]
-    )
-    return hand_over(fit_of(report, model, run, errors), stop)
-
-
-def _cost(found: systems.FreeRunFit) -> float:
-    return float(found.report.cost)
-
-
-def _row(parameters: Mapping[str, float]) -> list[float]:
-    names = tuple(systems.DriveAxis.parameter_names)
-    unknown = [name for name in parameters if name not in names]
-    if unknown:
-        raise ParameterError(f"parameter {unknown[0]!r}: must be one of {', '.join(names)}")
-    at_rest = {"mass_kg": 1.0, "stribeck_speed_m_per_s": 0.03}
-    return [float(parameters.get(name, at_rest.get(name, 0.0))) for name in names]
-
-
-def _scattered(
-    centre: Mapping[str, float], free: list[str], scale: float, rng: np.random.Generator
-) -> dict[str, float]:
-    point = dict(centre)
-    for name in free:
-        if name in _RELATIVE:
-            point[name] *= float(np.exp(scale * _RELATIVE[name] * rng.standard_normal()))
-        else:
-            point[name] += float(scale * _ABSOLUTE[name] * rng.standard_normal())
-    # Inside the bounds of the core.
-    point["stribeck_speed_m_per_s"] = max(point["stribeck_speed_m_per_s"], _REST)
-    return point
-
-
-def _core_record(record: xr.Dataset) -> Any:
-    position, speed = drive_start(record)
-    first = _WINDOW - 1
-    return systems.FreeRunRecord(
-        input=record["drive_v"].to_numpy()[first:],
-        output=record["position_m"].to_numpy()[first:],
-        start=[position, speed, float(record["time_s"][first])],
+    return fit_model(
+        model,
+        later,
+        free=("mass_kg", "viscous_ns_per_m", *_FORMS[friction], *(("offset_drift_n_per_s",) if drift else ())),
+        free_state=(0, 1),
+        bounds={**_around(model.parameters), "stribeck_n": (0.0, 10.0), "stribeck_speed_m_per_s": (_REST, 0.2)},
         skip=1,
+        shooting_samples=_STRETCH if later.sizes["time_s"] > 2 * _STRETCH else None,
+        options=chosen,
+    )
+
+
+def _around(start: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Give bounds about a start: a third of what is positive, and as much force for what has a sign."""
+    names = ("mass_kg", "viscous_ns_per_m", "coulomb_n")
+    bounds = {name: (start[name] / 1.5, 1.5 * start[name]) for name in names}
+    signed = (("viscous_asymmetry_ns_per_m", "viscous_ns_per_m"), ("offset_n", "coulomb_n"))
+    return (
+        bounds
+        | {name: (start[name] - 0.5 * start[of], start[name] + 0.5 * start[of]) for name, of in signed}
+        | {"offset_drift_n_per_s": (-1.0, 1.0), "state_0": (-10.0, 10.0), "state_1": (-10.0, 10.0)}
     )

@@ -1,106 +1,57 @@
-"""Wiener-Hammerstein models: a linear filter, a static curve, a linear filter."""
+"""Wiener-Hammerstein circuit: a linear filter, a static curve, a linear filter, as a simulator of a few lines."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core import systems
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
-from mgdd.optimize.least_squares import CoreReport, FitOptions, LeastSquaresOptions, fit_of, fit_options, fit_run
-from mgdd.parallel.finished import hand_over, keep_finished
+from mgdd.identify import SimulatorModel, fit_model
+from mgdd.optimize import FitOptions
 from mgdd.results import Fit
-from mgdd.results.describe import described
-from mgdd.results.fit_report import FitReport
-from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.model import RunInputs, SampledModel
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Vector = NDArray[np.float64]
 
-__all__ = [
-    "LinearApproximation", "WienerHammersteinFit", "WienerHammersteinModel", "fit_linear", "fit_wiener_hammerstein",
-]  # fmt: skip
+__all__ = ["Circuit", "LinearFilter", "fit_linear", "fit_wiener_hammerstein"]
 
-_LABELS = MappingProxyType({"input_v": Label("V", "input voltage"), "output_v": Label("V", "output voltage")})
 _SKIP = 100  # samples in which a filter that starts at rest forgets it
 _SCAN_DEGREE = 6  # of the polynomial that stands for the curve while partitions are compared
-_UNITS = dict.fromkeys(("input_mean", "output_mean", "rmse", "lower", "upper"), "unit of the record")
+_SCAN_STEPS = 40  # trial steps of the short fit of a partition
 _MARGIN = 0.05  # of the range of the signal, on either side of the curve's grid
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class LinearApproximation(SampledModel, Parameters):
-    """A linear filter B/A about the mean of a record.
+@dataclass(frozen=True)
+class LinearFilter:
+    """A filter B/A about the mean of a record: ``a1`` to ``an``, ``b0`` to ``bn``, then the means of in- and output."""
 
-    Parameters
-    ----------
-    numerator, denominator : ndarray
-        Coefficients of q^-1, the first of the denominator is 1.
-    input_mean, output_mean : float
-        Taken off the input, added to the output, in the units of the record.
-    rmse : float
-        Of the response over the record, first 100 samples left out [unit of the output].
+    order: int
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
-    >>> lag = LinearApproximation(
-    ...     numerator=np.array([0.5]), denominator=np.array([1.0, -0.5]), input_mean=0.0, output_mean=1.0, rmse=0.0)
-    >>> lag.simulate({"time_s": [0.0, 1.0, 2.0], "input_v": [1.0, 1.0, 1.0]})["output_v"].values.tolist()
-    [1.5, 1.75, 1.875]
-    """
+    def __call__(self, x: Vector, u: Vector, p: Vector) -> Vector:
+        """Filter the deviation of the input."""
+        del x
+        a, b = np.r_[1.0, p[: self.order]], p[self.order : -2]
+        return np.asarray(_filtered(b, a, u[:, 0] - p[-2]) + p[-1])
 
-    kind = "linear_filter"
-    input_names = ("input_v",)
-    output_name = "output_v"
-    labels = _LABELS
-
-    numerator: Vector
-    denominator: Vector
-    input_mean: float
-    output_mean: float
-    rmse: float
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Coefficients by name."""
-        both = {"numerator": self.numerator, "denominator": self.denominator}
-        return {f"{name}_{i}": float(value) for name, values in both.items() for i, value in enumerate(values)}
-
-    def _rest(self) -> list[float]:
-        return []
-
-    def _run(self, run: RunInputs) -> Vector:
-        deviation = run.columns[0] - self.input_mean
-        return np.asarray(systems.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
-
-    def to_parameters(self) -> ParameterFile:
-        """Give filter and means, as `to_toml` writes them."""
-        return _saved(self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> LinearApproximation:
-        """Make the filter of a file that `to_toml` or a fit wrote."""
-        numbers, vectors = ("input_mean", "output_mean", "rmse"), ("numerator", "denominator")
-        return cls(**_read(cls.kind, file, numbers=numbers, vectors=vectors))
+    def model(self, a: Vector, b: Vector, input_mean: float, output_mean: float) -> SimulatorModel:
+        """Make a model with these coefficients."""
+        values = {**_named("a", a[1:], 1), **_named("b", b, 0), "input_mean": input_mean, "output_mean": output_mean}
+        return _model(self, values)
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class WienerHammersteinModel(SampledModel, Parameters):
-    """Filter, static curve, filter; both filters have gain 1 at rest.
+@dataclass(frozen=True)
+class Circuit:
+    """Filter, cubic spline, filter; both filters have gain 1 at rest, so the curve carries the unit and the gain.
+
+    Parameters of each filter: ``a1`` to ``an``, ``b0`` to ``b(n - 1)``, the last one follows from the gain; then the
+    coefficients of the spline, on equal steps from `lower` to `upper`.
 
     Parameters
     ----------
@@ -108,95 +59,52 @@ class WienerHammersteinModel(SampledModel, Parameters):
         Orders of the filters and number of spline coefficients.
     lower, upper : float
         Grid of the curve, in the unit of the input.
-    values : ndarray
-        Coefficients in the order of the report's names.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd_studies.benchmarks.wiener_hammerstein import WienerHammersteinModel
-    >>> circuit = WienerHammersteinModel(
-    ...     first_order=1, last_order=1, n_curve=4, lower=-1.0, upper=1.0,
-    ...     values=np.r_[-0.5, 0.5, -0.5, 0.5, -3.0, -1.0, 1.0, 3.0])  # two lags, and a curve that is the identity
-    >>> run = circuit.simulate({"time_s": [0.0, 1.0, 2.0], "input_v": [1.0, 1.0, 1.0]})
-    >>> run["output_v"].values.round(4).tolist()
+    >>> from mgdd_studies.benchmarks.wiener_hammerstein import Circuit
+    >>> circuit = Circuit(first_order=1, last_order=1, n_curve=4, lower=-1.0, upper=1.0)
+    >>> p = np.r_[-0.5, 0.5, -0.5, 0.5, -3.0, -1.0, 1.0, 3.0]  # two lags, and a curve that is the identity
+    >>> circuit(np.empty(0), np.ones((3, 1)), p).round(4).tolist()
     [0.25, 0.5, 0.6875]
     """
-
-    kind = "wiener_hammerstein"
-    input_names = ("input_v",)
-    output_name = "output_v"
-    labels = _LABELS
 
     first_order: int
     last_order: int
     n_curve: int
     lower: float
     upper: float
-    values: Vector
 
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Coefficients by name."""
-        return dict(zip(_core_model(self).names, self.values.tolist(), strict=True))
+    def __call__(self, x: Vector, u: Vector, p: Vector) -> Vector:
+        """Simulate from rest."""
+        del x
+        first, last, curve = np.split(p, [2 * self.first_order, 2 * (self.first_order + self.last_order)])
+        between = _filtered(*_gain_one(first), u[:, 0])
+        return _filtered(*_gain_one(last), self.curve(between, curve))
 
-    def _rest(self) -> list[float]:
-        return []
+    def curve(self, signal: Vector, coefficients: Vector) -> Vector:
+        """Evaluate the static curve at what leaves the first filter; it goes on straight beyond its grid."""
+        from scipy.interpolate import BSpline
 
-    def _run(self, run: RunInputs) -> Vector:
-        return np.asarray(_core_model(self).simulate(self.values, run.columns[0]))
+        step = (self.upper - self.lower) / (self.n_curve - 3)
+        spline = BSpline(self.lower + step * np.arange(-3, self.n_curve + 1), coefficients, 3)
+        inside = np.clip(signal, self.lower, self.upper)
+        value: Vector = spline(inside)
+        out = np.flatnonzero(inside != signal)
+        value[out] += spline(inside[out], nu=1) * (signal[out] - inside[out])
+        return value
 
-    def to_parameters(self) -> ParameterFile:
-        """Give orders, grid and coefficients, as `to_toml` writes them."""
-        return _saved(self, ("first_order", "last_order", "n_curve", "lower", "upper", "values"))
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> WienerHammersteinModel:
-        """Make the model of a file that `to_toml` or a fit wrote."""
-        orders = ("first_order", "last_order", "n_curve")
-        return cls(**_read(cls.kind, file, numbers=("lower", "upper"), vectors=("values",), integers=orders))
-
-    def curve(self, signal: ArrayLike) -> Vector:
-        """Evaluate the static curve.
-
-        Parameters
-        ----------
-        signal : array_like, shape (n,)
-            What leaves the first filter.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            What enters the last.
-        """
-        return np.asarray(_core_model(self).curve(self.values, np.asarray(signal, dtype=np.float64)))
+    def model(self, values: Vector) -> SimulatorModel:
+        """Make a model with these coefficients."""
+        named: dict[str, float] = {}
+        for name, order, at in (("first", self.first_order, 0), ("last", self.last_order, 2 * self.first_order)):
+            named |= _named(f"{name}_a", values[at : at + order], 1)
+            named |= _named(f"{name}_b", values[at + order : at + 2 * order], 0)
+        return _model(self, named | _named("curve", values[2 * (self.first_order + self.last_order) :], 0))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class WienerHammersteinFit(Fit):
-    """A fit of a Wiener-Hammerstein model; `start_rmse` has the error of every partition that was followed.
-
-    Parameters
-    ----------
-    linear : LinearApproximation
-        The linear filter it started from.
-
-    Examples
-    --------
-    >>> from mgdd_studies.benchmarks import records
-    >>> from mgdd.optimize import FitOptions
-    >>> from mgdd_studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
-    >>> if "wh2009" in records.names():
-    ...     some = records.read("wh2009")[0].isel(time_s=slice(0, 5000))
-    ...     options = FitOptions(max_iterations=10)
-    ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, options=options)
-    ...     assert fit.train.rmse <= fit.linear.rmse
-    """
-
-    linear: LinearApproximation
-
-
-def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> LinearApproximation:
+def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> SimulatorModel:
     """Fit a linear filter by repeated prefiltered least squares; the best iteration is kept.
 
     Parameters
@@ -210,8 +118,8 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
 
     Returns
     -------
-    LinearApproximation
-        The filter.
+    SimulatorModel
+        A `LinearFilter`.
 
     Raises
     ------
@@ -229,7 +137,9 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     >>> from mgdd_studies.benchmarks import records
     >>> from mgdd_studies.benchmarks.wiener_hammerstein import fit_linear
     >>> if "wh2009" in records.names():
-    ...     assert fit_linear(records.read("wh2009")[0], order=2, iterations=3).rmse > 0.04
+    ...     train = records.read("wh2009")[0]
+    ...     error = fit_linear(train, order=2, iterations=3).simulate(train)["output_v"] - train["output_v"]
+    ...     assert error.std() > 0.04
     """
     if not 1 <= order <= 10:
         raise ParameterError.of("order", order, "in [1, 10]")
@@ -237,7 +147,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     mean_u, mean_y = float(u.mean()), float(y.mean())
     u, y = u - mean_u, y - mean_y
     a = np.r_[1.0, np.zeros(order)]
-    best: tuple[float, Vector, Vector] = (np.inf, np.ones(1), np.ones(1))
+    best: tuple[float, Vector, Vector] = (np.inf, a, a)
     n = u.size
     for _ in range(iterations):
         uf, yf = _filtered(np.ones(1), a, u), _filtered(np.ones(1), a, y)
@@ -251,9 +161,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
         error = float(np.sqrt(np.mean((y - _filtered(b, a, u))[_SKIP:] ** 2)))
         if error < best[0]:
             best = (error, b, a)
-    return LinearApproximation(
-        numerator=best[1], denominator=best[2], input_mean=mean_u, output_mean=mean_y, rmse=best[0]
-    )
+    return LinearFilter(order).model(best[2], best[1], mean_u, mean_y)
 
 
 def fit_wiener_hammerstein(
@@ -263,15 +171,15 @@ def fit_wiener_hammerstein(
     first_order: int = 3,
     last_order: int = 4,
     n_curve: int = 20,
-    follow: int = 8,
-    scan_samples: int = 15_000,
+    follow: int = 4,
+    scan_samples: int = 8000,
     options: FitOptions | None = None,
-) -> WienerHammersteinFit:
+) -> Fit:
     """Fit filter, curve and filter to the response of a circuit.
 
     A linear approximation comes first. Its poles and zeros are shared out between the two filters in every possible
     way; each partition is judged with a polynomial curve on the first `scan_samples`, the best few are fitted there
-    completely, and the winner on the whole record. All parameters move together then, with exact derivatives.
+    completely, and the winner on the whole record. All parameters move together then.
 
     Parameters
     ----------
@@ -282,19 +190,18 @@ def fit_wiener_hammerstein(
     first_order, last_order : int
         Of the two filters; a partition with more poles on one side swaps or is left out.
     n_curve : int
-        Coefficients of the cubic spline.
+        Coefficients of the cubic spline, at least 4.
     follow : int
         Partitions that get a complete short fit.
     scan_samples : int
         Samples used until one partition has won.
     options : FitOptions, optional
-        30 trial steps and a tolerance of 1e-7 of the last fit by default; the other options have no
-        effect here and are refused.
+        15 trial steps and a tolerance of 1e-7 of the last fit by default, otherwise as of `mgdd.identify.fit_model`.
 
     Returns
     -------
     mgdd.results.Fit
-        Report and model in the unit of the output, first 100 samples left out, and the linear start, ``linear``.
+        Report, first 100 samples left out, and model, whose simulator is a `Circuit`.
 
     Raises
     ------
@@ -303,7 +210,7 @@ def fit_wiener_hammerstein(
     mgdd.errors.DataError
         Fewer than 1000 samples, or no partition that fits the orders.
     mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the best fit so far, to the first `scan_samples` until one partition has won.
+        Ctrl-C; ``partial`` is the search that was under way.
 
     References
     ----------
@@ -314,7 +221,7 @@ def fit_wiener_hammerstein(
     --------
     >>> import numpy as np
     >>> from mgdd.optimize import FitOptions
-    >>> from mgdd_studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
+    >>> from mgdd_studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
     >>> from mgdd.results.labels import labelled_dataset
     >>> rng = np.random.default_rng(1)
     >>> u = np.convolve(rng.standard_normal(6003), np.ones(4) / 4.0, "valid")
@@ -329,65 +236,54 @@ def fit_wiener_hammerstein(
     >>> fit = fit_wiener_hammerstein(
     ...     record, linear_order=2, first_order=1, last_order=1, scan_samples=3000,
     ...     options=FitOptions(max_iterations=60))
-    >>> fit.train.rmse < 0.1 * fit.linear.rmse
+    >>> linear = fit_linear(record, order=2).simulate(record)["output_v"] - record["output_v"]
+    >>> fit.train.rmse < 0.1 * float(linear.std())
     True
     """
     if not 1 <= follow <= 1000:
         raise ParameterError.of("follow", follow, "in [1, 1000]")
-    chosen = fit_options(options, max_iterations=30, tolerance=1e-7)
+    ParameterError.unless(n_curve >= 4, "n_curve", n_curve, ">= 4")
+    given = options or FitOptions()
+    last = FitOptions(
+        n_starts=given.n_starts,
+        seed=given.seed,
+        max_iterations=given.max_iterations or 15,
+        tolerance=given.tolerance or 1e-7,
+    )
     u, y = _signals(record)
-    linear = fit_linear(record, order=linear_order)
-    some_u, some_y = u[:scan_samples], y[:scan_samples]
-    candidates = _partitions(linear, some_u, some_y, first_order, last_order)[:follow]
+    linear = np.array(list(fit_linear(record, order=linear_order).parameters.values()))
+    a, b = np.r_[1.0, linear[:linear_order]], linear[linear_order:-2]
+    some = record.isel(time_s=slice(0, scan_samples))
+    candidates = _partitions(a, b, u[:scan_samples], y[:scan_samples], first_order, last_order)[:follow]
     if not candidates:
         raise DataError(
             f"no partition of {linear_order} poles fits first_order = {first_order} and last_order = {last_order}: "
             "raise the orders"
         )
-    models: list[systems.WienerHammerstein] = []
-    reports: list[CoreReport] = []
-
-    def short(candidate: Candidate) -> CoreReport:
-        model, start = _start(candidate, first_order, last_order, n_curve, some_u)
-        models.append(model)
-        return _fit(model, start, some_u, some_y, 40)
-
-    stop = keep_finished(short, candidates, reports)
-    ranked = sorted(zip(reports, models, strict=False), key=lambda pair: float(pair[0].rmse))
-    best, model = ranked[0]
-    last = [best]
-    if stop is None:
-        stop = keep_finished(
-            lambda start: _fit(model, start, u, y, chosen.max_iterations, chosen.tolerance), [best.values], last
+    short = FitOptions(max_iterations=_SCAN_STEPS, tolerance=1e-4)
+    fits = [
+        fit_model(
+            _start(candidate, first_order, last_order, n_curve, u[:scan_samples]), some, skip=_SKIP, options=short
         )
-    report, seen = last[-1], y if len(last) > 1 else some_y
-    wrapped = FitReport.from_core(report, seen[_SKIP:])
-    fitted = WienerHammersteinModel(
-        first_order=first_order, last_order=last_order, n_curve=n_curve, lower=model.lower, upper=model.upper,
-        values=np.asarray(report.values),
-    )  # fmt: skip
-    modelled = fitted.simulate(record)["output_v"].to_numpy()
-    run = fit_run(record["time_s"].to_numpy()[_SKIP:], y[_SKIP:], modelled[_SKIP:], _LABELS["output_v"])
-    fit = fit_of(wrapped, fitted, run, (float(one.rmse) for one in reports))
-    return hand_over(WienerHammersteinFit(**vars(fit), linear=linear), stop)
+        for candidate in candidates
+    ]
+    best = min(fits, key=lambda fit: fit.report.cost)
+    return fit_model(best.model, record, skip=_SKIP, options=last)
 
 
-def _saved(model: LinearApproximation | WienerHammersteinModel, names: tuple[str, ...]) -> ParameterFile:
-    return ParameterFile(kind=model.kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
+def _model(simulator: LinearFilter | Circuit, values: dict[str, float]) -> SimulatorModel:
+    return SimulatorModel(simulator=simulator, parameters=values, input_names=("input_v",), output_names=("output_v",))
 
 
-def _read(
-    kind: str,
-    file: ParameterFile,
-    *,
-    numbers: tuple[str, ...],
-    vectors: tuple[str, ...],
-    integers: tuple[str, ...] = (),
-) -> dict[str, Any]:
-    file.expect(kinds=(kind,), tables=("parameters", "fit?"), notes=FIT_NOTES)
-    expected = {**wanted(numbers, _UNITS), **wanted(vectors, form="numbers"), **wanted(integers, form="integer")}
-    values = file.values("parameters", expected)
-    return values | {name: np.array(values[name], dtype=np.float64) for name in vectors}
+def _named(name: str, values: Vector, first: int) -> dict[str, float]:
+    return {f"{name}{i + first}": float(value) for i, value in enumerate(values)}
+
+
+def _gain_one(p: Vector) -> tuple[Vector, Vector]:
+    """Return numerator and denominator of a filter, the last numerator coefficient such that its gain is 1."""
+    order = p.size // 2
+    a = np.r_[1.0, p[:order]]
+    return np.r_[p[order:], a.sum() - p[order:].sum()], a
 
 
 def _filtered(b: Vector, a: Vector, signal: Vector) -> Vector:
@@ -404,25 +300,6 @@ def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
     return u, y
 
 
-def _core_model(model: WienerHammersteinModel) -> systems.WienerHammerstein:
-    return systems.WienerHammerstein(
-        first_order=model.first_order, last_order=model.last_order, n_curve=model.n_curve, lower=model.lower,
-        upper=model.upper,
-    )  # fmt: skip
-
-
-def _fit(
-    model: systems.WienerHammerstein,
-    start: Vector,
-    u: Vector,
-    y: Vector,
-    iterations: int,
-    tolerance: float = 1e-7,
-) -> CoreReport:
-    options = LeastSquaresOptions(max_iterations=iterations, cost_tolerance=tolerance)
-    return model.fit(start=start, input=u, output=y, skip=_SKIP, options=options)
-
-
 def _groups(roots: NDArray[Any]) -> list[list[complex]]:
     pairs = [[complex(z), complex(z.conjugate())] for z in roots if z.imag > 1e-9]
     return pairs + [[complex(z.real)] for z in roots if abs(z.imag) <= 1e-9]
@@ -435,17 +312,17 @@ def _polynomial(groups: list[list[complex]]) -> Vector:
 Candidate = tuple[float, "Vector", "Vector", "Vector", "Vector", "Vector", float]
 
 
-def _partitions(linear: LinearApproximation, u: Vector, y: Vector, first: int, last: int) -> list[Candidate]:
+def _partitions(a: Vector, b: Vector, u: Vector, y: Vector, first: int, last: int) -> list[Candidate]:
     """Every way to share out poles and zeros, with the error that a polynomial curve leaves; best first."""
-    poles, zeros = _groups(np.roots(linear.denominator)), _groups(np.roots(linear.numerator))
+    poles, zeros = _groups(np.roots(a)), _groups(np.roots(b))
     found: list[Candidate] = []
     for pole_side in itertools.product((0, 1), repeat=len(poles)):
         for zero_side in itertools.product((0, 1), repeat=len(zeros)):
             filters = []
             for side in (0, 1):
-                a = _polynomial([g for g, at in zip(poles, pole_side, strict=True) if at == side])
-                b = _polynomial([g for g, at in zip(zeros, zero_side, strict=True) if at == side])
-                filters.append((b * a.sum() / b.sum(), a))
+                denominator = _polynomial([g for g, at in zip(poles, pole_side, strict=True) if at == side])
+                numerator = _polynomial([g for g, at in zip(zeros, zero_side, strict=True) if at == side])
+                filters.append((numerator * denominator.sum() / numerator.sum(), denominator))
             (b1, a1), (b2, a2) = filters
             proper = b1.size <= a1.size and b2.size <= a2.size
             if not (proper and 2 <= a1.size <= first + 1 and 2 <= a2.size <= last + 1):
@@ -469,19 +346,14 @@ def _padded(b: Vector, a: Vector, order: int) -> tuple[Vector, Vector]:
     return np.r_[b, np.zeros(a.size - b.size)], a
 
 
-def _start(
-    candidate: Candidate, first: int, last: int, n_curve: int, u: Vector
-) -> tuple[systems.WienerHammerstein, Vector]:
+def _start(candidate: Candidate, first: int, last: int, n_curve: int, u: Vector) -> SimulatorModel:
     _, b1, a1, b2, a2, curve, scale = candidate
     (b1, a1), (b2, a2) = _padded(b1, a1, first), _padded(b2, a2, last)
-    between = np.asarray(_filtered(b1, a1, u))
+    between = _filtered(b1, a1, u)
     margin = _MARGIN * float(np.ptp(between))
-    lower, upper = float(between.min()) - margin, float(between.max()) + margin
-    model = systems.WienerHammerstein(first_order=first, last_order=last, n_curve=n_curve, lower=lower, upper=upper)
-    grid = np.linspace(lower, upper, 20 * n_curve)
-    filters = np.r_[a1[1:], b1[:-1], a2[1:], b2[:-1]]
-    unit = np.eye(n_curve)
-    basis = np.column_stack([model.curve(np.r_[filters, unit[k]], grid) for k in range(n_curve)])
+    circuit = Circuit(first, last, n_curve, float(between.min()) - margin, float(between.max()) + margin)
+    grid = np.linspace(circuit.lower, circuit.upper, 20 * n_curve)
+    basis = np.column_stack([circuit.curve(grid, unit) for unit in np.eye(n_curve)])
     wanted = sum(c * (grid / scale) ** k for k, c in enumerate(curve))
     coefficients = np.linalg.lstsq(basis, wanted, rcond=None)[0]
-    return model, np.r_[filters, coefficients]
+    return circuit.model(np.r_[a1[1:], b1[:-1], a2[1:], b2[:-1], coefficients])

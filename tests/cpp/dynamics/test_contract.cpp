@@ -16,11 +16,7 @@
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "support/no_alloc.hpp"
-#include "support/respond.hpp"
 #include "support/throttle_records.hpp"
-#include "systems/drive_axis.hpp"
-#include "systems/two_tanks.hpp"
-#include "systems/wiener_hammerstein.hpp"
 
 namespace mgdd::dynamics {
 namespace {
@@ -151,29 +147,6 @@ TEST(ModelContract, ThePlantOnEveryScalarWithEveryOption) {
       expect_one_law([&]<class T>(T zero) { return make(zero); }, u, 0.3);
     }
   }
-}
-
-TEST(ModelContract, BenchmarkSystemsOnEveryScalar) {
-  using namespace systems;
-  const std::array<double, 9> slide{95.0, 200.0, -37.0, 20.0, 2.0, 0.03, -0.5, -0.02, 3.0};
-  expect_one_law(from_family(DriveAxis{35.0, 0.1}, slide, std::array{0.1, 0.0, 0.0}, 1e-3), inputs(0.2, 2.0), 1e-4);
-  const std::array<double, 9> tanks{0.05, 0.01, 1.0, 0.05, 0.5, 1.0, 6.0, 0.5, 1.5};
-  expect_one_law(from_family(TwoTanks{}, tanks, std::array{5.0, 2.0, 0.0, 0.0}, 4.0), inputs(2.0, 1.0), 1e-3);
-  const WienerHammerstein circuit{.first_order = 1, .last_order = 2, .n_curve = 7, .lower = -1.5, .upper = 1.5};
-  Eigen::VectorXd x(circuit.n_parameters());
-  x << -0.6, 0.1, -1.1, 0.4, 0.05, 0.1, -2.0, -1.3, -0.9, 0.1, 0.5, 0.6, 0.65;
-  const auto u = inputs(0.0, 1.2);
-  const auto make = [&]<class T>(T zero) {
-    const WienerHammersteinModel<T> model(circuit, x);
-    return std::pair(model, model.at_rest(zero));
-  };
-  expect_one_law(make, u, 1e-4);
-  // The same signal as the whole record through the filters at once.
-  const WienerHammersteinModel<double> model(circuit, x);
-  const auto y = test_support::respond(model, model.at_rest(0.0), u);
-  const Eigen::VectorXd whole = circuit.simulate(x, Eigen::Map<const Eigen::VectorXd>(u.data(), samples));
-  for (std::size_t k = 0; k < samples; ++k)
-    ASSERT_NEAR(y[k], whole[static_cast<Eigen::Index>(k)], 1e-13);
 }
 
 TEST(ModelContract, NumbersCarryTheWholeState) {

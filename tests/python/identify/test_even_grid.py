@@ -62,7 +62,8 @@ def drive(time: np.ndarray[Any, Any]) -> object:
 def tanks(time: np.ndarray[Any, Any]) -> object:
     level = 5.0 + np.sin(3.0 * EVEN)
     record = {"pump_v": ("time_s", DUTY + 3.0, "V", "pump"), "level_v": ("time_s", level, "V", "level")}
-    return fit_two_tanks(labelled_dataset({"time_s": ("time_s", time), **record}), options=ONCE)
+    slow = 4.0 / STEP * time  # the tanks are sampled every 4 s
+    return fit_two_tanks(labelled_dataset({"time_s": ("time_s", slow), **record}), options=ONCE)
 
 
 def circuit(time: np.ndarray[Any, Any]) -> object:
@@ -91,7 +92,7 @@ USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
         log(time), lambda _, duty, __: 30.0 + 100.0 * np.asarray(duty)
     ),
     "fit_ode": lambda time: identify.fit_ode(
-        lag, log(time), input_names=["duty"], output_name="angle_deg", parameters={"gain": 1.0, "lag_s": 0.1},
+        lag, log(time), input_names=["duty"], output_names=["angle_deg"], parameters={"gain": 1.0, "lag_s": 0.1},
         initial_state=[8.0], options=ONCE,
     ),
     "drive": drive,

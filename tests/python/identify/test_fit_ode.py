@@ -124,7 +124,7 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     with pytest.raises(DataError, match="u: sample 7"):
         fit(time, np.where(np.arange(100) == 7, np.nan, u), y)
     with pytest.raises(DataError, match="y: every sample is missing"):
-        fit(time, u, np.full(100, np.nan))
+        fit(time, u, np.full(100, np.nan), initial_state=[0.0, 0.0])
     for name, value, error in (
         ("interpolation", "spline", ParameterError),
         ("input_delay_s", -0.1, ParameterError),

@@ -180,7 +180,7 @@ def test_an_ode_model_comes_back_with_its_functions() -> None:
     assert again == model
     inputs = {"time_s": TIME, "u": DUTY}
     xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
-    with pytest.raises(ParameterError, match="output = _first_state: text was written with second; give that function"):
+    with pytest.raises(ParameterError, match="output = first_states: text was written with second; give that function"):
         OdeModel.from_toml(model.to_toml(), derivative=lag)
 
 

@@ -8,7 +8,6 @@ from scipy.signal import savgol_filter
 
 from mgdd.signals.excitation import _TAPS, maximum_length_sequence
 from mgdd.signals.repeats import copies, noise_of, still
-from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
 
 
 def shift_register(register: int) -> list[int]:
@@ -42,21 +41,6 @@ def test_smoothing_is_a_least_squares_cubic_of_each_window(half: int, step_s: fl
         smooth = savgol_filter(angle, 2 * half + 1, 3, deriv=order, delta=step_s)[half:-half]
         expected = factor * cubics[order]
         np.testing.assert_allclose(smooth, expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_filter_is_its_difference_equation(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    poles = rng.uniform(0.3, 0.95, 2) * np.exp(1j * rng.uniform(0.1, 2.5, 2))
-    a = np.real(np.poly(np.r_[poles, poles.conj(), 0.5]))
-    b, u = rng.normal(size=4), rng.normal(size=400)
-    y = np.zeros(u.size)
-    for k in range(u.size):
-        past = sum(a[i] * y[k - i] for i in range(1, a.size) if k >= i)
-        y[k] = sum(b[i] * u[k - i] for i in range(b.size) if k >= i) - past
-    model = LinearApproximation(numerator=b, denominator=a, input_mean=0.0, output_mean=0.0, rmse=0.0)
-    record = {"time_s": np.arange(u.size) * 1e-3, "input_v": u}
-    np.testing.assert_allclose(model.simulate(record)["output_v"], y, rtol=0.0, atol=1e-12 * np.abs(y).max())
 
 
 RANDOM = np.random.default_rng(1)
