@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import DiscreteModel, OdeModel, SimulatorModel, fit_model, fit_ode, profile_likelihood
+from mgdd.identify.grey_box.search import Ties
 from mgdd.optimize import FitOptions
 
 TIME = 0.1 * np.arange(300)
@@ -190,6 +191,22 @@ def test_stretches_find_a_frequency_that_a_free_run_loses(several):
     assert cut.report.residual.size == 300 * (1 + several)
 
 
+def test_slopes_of_stretches_and_gaps_are_those_of_their_residual():
+    model = both(TRUE)
+    records = [record_of(model), {name: column[:170] for name, column in record_of(model, seed=2).items()}]
+    free = {"free_state": [1], "bounds": {"fast": (0.0, 1.0)}, "horizon": 3}
+    search = fit_model(both(NEAR), records, **free).search
+    ties = Ties(length=60, weight=np.array([0.7, 2.0]))
+    rng = np.random.default_rng(6)
+    x = np.r_[0.55, 0.85, -0.02, -0.8, -1.2, rng.normal(size=2 * (4 + 2))]
+    value, slopes = search.residual(x, ties)
+    assert value.size == 2 * (297 + 167) + 2 * (4 + 2)
+    for i in range(x.size):
+        h = 1e-5 * np.eye(x.size)[i]
+        numeric = (search.residual(x + h, ties)[0] - search.residual(x - h, ties)[0]) / 2e-5
+        np.testing.assert_allclose(slopes[:, i], numeric, atol=1e-6 * max(1.0, np.abs(numeric).max()))
+
+
 def test_stretches_that_a_model_cannot_have_are_refused():
     record = record_of(DiscreteModel(step=slide, parameters={"kept": 0.8, "push": 0.3}, initial_state=(0.0, 0.0)))
     model = DiscreteModel(step=slide, parameters={"kept": 0.8, "push": 0.3}, initial_state=(0.0, 0.0))
@@ -286,12 +303,14 @@ def test_a_parameter_that_does_not_act_is_named():
     assert (profile.low, profile.high) == (-np.inf, np.inf)
 
 
-def test_a_model_without_a_slope_at_a_bound_is_evaluated_inside_or_named():
-    model = DiscreteModel(
-        step=lambda x, u, p: 0.5 * x + np.sqrt(p[0]) * u[0], parameters={"power": 0.0}, initial_state=(0.0,)
-    )
-    record = record_of(DiscreteModel(step=model.step, parameters={"power": 0.3}, initial_state=(0.0,)))
-    with pytest.raises(ParameterError, match=r"power = 0: the model has no slope there.*give bounds=\{'power': ...\}"):
+@pytest.mark.parametrize(("root", "edge", "box"), [("lower", 0.0, (0.0, 2.0)), ("upper", 2.0, (0.5, 2.0))])
+def test_a_model_without_a_slope_at_a_bound_is_evaluated_inside_or_named(root, edge, box):
+    def step(x, u, p):
+        return 0.5 * x + np.sqrt(p[0] if root == "lower" else 2.0 - p[0]) * u[0]
+
+    model = DiscreteModel(step=step, parameters={"power": edge}, initial_state=(0.0,))
+    record = record_of(DiscreteModel(step=step, parameters={"power": 0.7}, initial_state=(0.0,)))
+    with pytest.raises(ParameterError, match=rf"power = {edge:g}: the model has no slope.*bounds=\{{'power': ...\}}"):
         fit_model(model, record)
-    found = fit_model(model, record, bounds={"power": (0.0, 2.0)}, options=FitOptions(max_iterations=200))
-    assert found.report.values[0] == pytest.approx(0.3, rel=1e-6)
+    found = fit_model(model, record, bounds={"power": box}, options=FitOptions(max_iterations=200))
+    assert found.report.values[0] == pytest.approx(0.7, rel=1e-6)
