@@ -67,6 +67,16 @@ def fitted(time: Any, u: Any, y: Any, start: Any) -> Any:
     return identify.fit_ode(lag, record, parameters=parameters, initial_state=start, options=options).report.values
 
 
+def stepped(time: Any, u: Any, y: Any, start: Any) -> Any:
+    model = identify.DiscreteModel(
+        step=lambda x, u, p: p[0] * x + p[1] * u[0], parameters={"pole": 0.9, "gain": 10.0}, initial_state=(0.0,)
+    )
+    options = optimize.FitOptions(max_iterations=2)
+    return identify.fit_model(
+        model, {"time_s": time, "u": u, "y": y}, initial_state=start, options=options
+    ).report.values
+
+
 def ode(time: Any, u: Any, start: Any) -> Any:
     parameters = {"gain": 100.0, "lag_s": 0.1}
     model = identify.OdeModel(derivative=lag, output=lambda x, *_: x[0], parameters=parameters, initial_state=(0.0,))
@@ -214,6 +224,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "guide.GuidedEngine.tell": (guided, (pressure(),)),
     "guide.OnlineCalibration.offer": (calibrated, (pressure(),)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
+    "identify.fit_model": (stepped, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "io.Encoder.angle": (wheel, (np.arange(0.0, 0.4, 1e-3), np.sin(200.0 * np.arange(0.0, 0.4, 1e-3)))),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
