@@ -21,7 +21,7 @@ sys.path.append(str(ROOT / "tools"))
 run_notebooks = importlib.import_module("run_notebooks")
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-DEAR_PAGES = {"tour.md", "getting_started.md", "calibration.md"}  # they calibrate
+DEAR_PAGES = {"tour.md", "getting_started.md", "calibration.md", "from_log_to_controller.md"}  # they calibrate
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 FENCE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
