@@ -175,10 +175,11 @@ void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> 
   horizon_.lowest = std::max(T(s.duty.lower), sent_.before[0] - room);
   horizon_.highest = std::min(T(s.duty.upper), sent_.before[0] + room);
   const T per_step = T(s.prediction_step_s / s.sample_s);
+  const T dead = T(s.sample_s) * T(delay_samples() - 1);  // the angle of the next sample belongs to this reference
   T last = reference_.value();
   std::size_t read = 0;
   for (int k = 0; k < settings_.n_steps(); ++k) {
-    T target = reference_.value() + reference_.rate() * T(s.prediction_step_s) * T(k + 1);
+    T target = reference_.value() + reference_.rate() * (dead + T(s.prediction_step_s) * T(k + 1));
     if (!preview_deg.empty()) {
       const auto wanted = static_cast<std::size_t>(T(delay_samples()) + per_step * T(k + 1));
       for (; read < std::min(wanted, preview_deg.size()) && std::isfinite(preview_deg[read]); ++read)
