@@ -7,17 +7,19 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 from mgdd import _core
 from mgdd._core.rig import Drive
 from mgdd._settings import remade
+from mgdd.control import GuidedPredictive
 from mgdd.errors import DataError, ParameterError, RigError, did_you_mean
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
 from mgdd.loop import Measurement, Plant
 
 _KIND = "safety_envelope"
 _CHOICE = "bus_fault_from"
+_Made = TypeVar("_Made")
 
 
 class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the core's text
@@ -61,6 +63,20 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
 def _entries() -> dict[str, Wanted]:
     fields = _core.rig.SafetyEnvelope.fields()
     return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
+
+
+
+def knowing(controller: _Made, envelope: SafetyEnvelope) -> _Made:
+    """Give a controller that learns from its duties the bounds of the gate behind it, others as they are.
+
+    What the gate clamps or slews without its knowledge looks like a delay to it, and it moves the plate about at rest.
+    """
+    if not isinstance(controller, GuidedPredictive) or not controller.settings["friction_learning"]:
+        return controller
+    own, limit = controller.settings, envelope.duty_limit
+    own["lower"], own["upper"] = max(own["lower"], -limit), min(own["upper"], limit)
+    own["duty_rate_per_s"] = min(own["duty_rate_per_s"], envelope.slew_per_s)
+    return type(controller)(**own)
 
 
 class SafetyChange(NamedTuple):

@@ -187,6 +187,15 @@ def test_tracking_is_the_loop_of_the_library_behind_a_gate() -> None:
     assert np.abs(np.diff(duty)).max() <= envelope.slew_per_s * 1e-3 + 1e-12
 
 
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_controller_that_learns_knows_the_bounds_of_its_gate(tmp_path: Path, seed: int) -> None:
+    """Untold, it takes the slew of the gate for a delay and moves the plate about at rest: variation 14 to 26."""
+    text = TRACK.replace("seed = 5", f"seed = {seed}").replace('"pid"', '"guided"').replace("20:35", "20:45")
+    run = run_experiment(experiment(text + "[plant]\nscale = { coulomb_nm = 1.2 }\n"), tmp_path / "run")
+    assert run.figures["total_variation"] < 10.0
+    assert run.figures["settling_ms"] < 80.0
+
+
 def test_equal_seeds_are_equal_runs_and_others_are_not() -> None:
     first, again = run_experiment(experiment(TRACK)), run_experiment(experiment(TRACK))
     other = run_experiment(experiment(TRACK.replace("seed = 5", "seed = 6")))

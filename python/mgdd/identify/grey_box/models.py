@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -44,8 +45,9 @@ class _Stepped(GreyBoxModel):
                 "give output=, or a state for each"
             )
 
+    @abstractmethod
     def _next(self, acting: Acting, k: int, x: Any, p: Any, call: Rows) -> NDArray[np.float64]:
-        raise NotImplementedError
+        """Return the states of the next sample."""
 
     def run_columns(
         self, acting: Acting, state: NDArray[np.float64], p: NDArray[np.float64]

@@ -224,7 +224,7 @@ def _throttle_plan(
     settings: IdentifyTask | TrackTask, sample_s: float, experiment: Experiment, envelope: SafetyEnvelope
 ) -> IdentifyPlan | TrackPlan:
     if isinstance(settings, TrackTask):
-        plan = TrackPlan(settings, sample_s=sample_s, folder=experiment.folder)
+        plan = TrackPlan(settings, sample_s=sample_s, folder=experiment.folder, envelope=envelope)
         low, high = float(plan.reference.angle_deg.min()), float(plan.reference.angle_deg.max())
         if not envelope.closed_deg <= low <= high <= envelope.open_deg:
             raise ParameterError.of(

@@ -23,6 +23,7 @@ from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.rig.experiment.settings import IdentifyTask, TrackTask, beside
+from mgdd.rig.safety import SafetyEnvelope, knowing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,8 +67,8 @@ def throttle_named(name: str, folder: Path) -> Throttle:
 class TrackPlan:
     """A controller along a reference, made and checked before anything moves."""
 
-    def __init__(self, task: TrackTask, *, sample_s: float, folder: Path) -> None:
-        self.task, self.sample_s = task, sample_s
+    def __init__(self, task: TrackTask, *, sample_s: float, folder: Path, envelope: SafetyEnvelope) -> None:
+        self.task, self.sample_s, self.envelope = task, sample_s, envelope
         self.reference = Reference.parse(str(beside(folder, task.reference)), sample_s=sample_s)
         if abs(self.reference.sample_s / sample_s - 1.0) > 1e-9:
             raise ParameterError.of(
@@ -90,7 +91,8 @@ class TrackPlan:
         delay = self.task.delay_samples
         if delay is None and groups_of(self.model).delay_s is None:
             delay = 0  # a rig answers within its cycle, and a preset says nothing about it
-        return tuned_with_doubts(self.task.controller, self.model, sample_s=self.sample_s, delay_samples=delay)
+        made, doubts = tuned_with_doubts(self.task.controller, self.model, sample_s=self.sample_s, delay_samples=delay)
+        return knowing(made, self.envelope), doubts
 
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant whose last measured angle is given, for at most so many samples."""

@@ -19,7 +19,7 @@ from mgdd.rig.can.processes import noted_signals
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.safety import SafetyEnvelope, said_of
+from mgdd.rig.safety import SafetyEnvelope, knowing, said_of
 
 _STEPS_DEG, _STEP_S = (20.0, 60.0, 35.0, 70.0, 15.0), 2.0
 _LONGEST_S = 3600.0
@@ -39,12 +39,14 @@ def simulate(path: str, period_s: float) -> None:
     # Of a busy desktop: what is late is counted, and does not end a demonstration.
     patient: dict[str, Any] = dict.fromkeys(("missed_deadlines", "unsent_cycles", "largest_age_cycles"), 1e6)
     ring, over = RingTransport(), threading.Event()
+    controller, _ = tuned_with_doubts("guided", presets.load("P1").throttle, sample_s=period_s, delay_samples=1)
+    envelope = SafetyEnvelope(cycle_s=period_s, **patient)
     loop = RealtimeLoop(
-        tuned_with_doubts("guided", presets.load("P1").throttle, sample_s=period_s, delay_samples=1)[0],
+        knowing(controller, envelope),
         ring,
         command=LoopMessage(can_id=0x120, signals={"duty": _DUTY, "enable": _ENABLE}),
         measurements=[LoopMessage(can_id=0x121, signals={"angle_deg": _ANGLE, **_VOLTS})],
-        envelope=SafetyEnvelope(cycle_s=period_s, **patient),
+        envelope=envelope,
         reference_deg=_STEPS_DEG[0],
     )
     plant = threading.Thread(target=_serve, args=(ring, period_s, over))
