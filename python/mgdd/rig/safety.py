@@ -65,7 +65,6 @@ def _entries() -> dict[str, Wanted]:
     return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
 
 
-
 def knowing(controller: _Made, envelope: SafetyEnvelope) -> _Made:
     """Give a controller that learns from its duties the bounds of the gate behind it, others as they are.
 
