@@ -157,6 +157,10 @@ void bind_guided_predictive(py::module_& m) {
   cls.def("refine", &GuidedPredictive::refine,
           "One more Gauss-Newton step on the last sample, and its duty [-]; feasible after every one.");
   cls.def("reset", &GuidedPredictive::reset, "As made, with what was learnt forgotten.");
+  cls.def(
+      "set_sent", &GuidedPredictive::set_sent, py::arg("duty"),
+      "The duty that was really sent for the last one [-], where a gate or a limiter changed it.\n\nIgnored if it is "
+      "not finite; what is clamped without its knowledge looks like a delay to the controller.");
   cls.def("take_over", &GuidedPredictive::take_over, py::arg("measurement_deg"), py::arg("duty"),
           "Start at rest from a duty, what was learnt kept.\n\nIgnored if a number is not finite.");
   cls.def_property(

@@ -58,6 +58,8 @@ void bind_steps(py::class_<Bound>& cls) {
   cls.def(
          "step", [](Bound& self, double reference, double measured) { return stepped(self, reference, measured); },
          py::arg("reference_deg"), py::arg("measurement_deg"))
+      .def(
+          "set_sent", [](Bound& self, double duty) { with(self, [=](auto& c) { c.set_sent(duty); }); }, py::arg("duty"))
       .def("reset", [](Bound& self) { with(self, [](auto& c) { c.reset(); }); })
       .def_property_readonly("duty", [](Bound& self) { return with(self, [](auto& c) { return c.duty(); }); })
       .def_property(

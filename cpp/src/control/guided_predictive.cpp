@@ -299,6 +299,11 @@ T BasicGuidedPredictive<T>::send() noexcept {
 }
 
 template <class T>
+void BasicGuidedPredictive<T>::set_sent(T duty) noexcept {
+  if (started_) correct_sent(sent_, duty_, settings_.duty, duty);
+}
+
+template <class T>
 void BasicGuidedPredictive<T>::reset() noexcept {
   started_ = prepared_ = holds_ = false;
   above_ = true;

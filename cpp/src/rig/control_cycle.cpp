@@ -160,6 +160,11 @@ bool ControlCycle::turn(const Turn& turn) noexcept {
   if (fresh) counts_.fresh.add();
   sample.asked_duty = asked(fresh);
   sample.drive = gate_.command(was_driven_ ? sample.asked_duty : 0.0);
+  if (was_driven_) {
+    on(controller_, [&](auto& c) noexcept {
+      if constexpr (requires { c.set_sent(sample.drive.duty); }) c.set_sent(sample.drive.duty);
+    });
+  }
   send(sample.drive);
   publish();
 

@@ -583,6 +583,12 @@ class GuidedPredictive:
         """
         As made, with what was learnt forgotten.
         """
+    def set_sent(self, duty: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        The duty that was really sent for the last one [-], where a gate or a limiter changed it.
+        
+        Ignored if it is not finite; what is clamped without its knowledge looks like a delay to the controller.
+        """
     @typing.overload
     def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """

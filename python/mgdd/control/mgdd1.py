@@ -172,6 +172,10 @@ class Mgdd1:
         """
         return float(self._core.step(reference_deg, measurement_deg))
 
+    def set_sent(self, duty: float) -> None:
+        """Set the duty that was really sent for the last one [-], where a gate changed it; ignored if not finite."""
+        self._core.set_sent(duty)
+
     def reset(self) -> None:
         """Forget everything that was measured."""
         self._core.reset()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 from mgdd._core.control import ThrottleSupervisor
 from mgdd.errors import ParameterError
@@ -18,6 +18,13 @@ class Controller(Protocol):
         ...
 
 
+def note_sent(controller: Any, duty: float) -> None:
+    """Give a controller that predicts from its own duties the one that really left; others have no use for it."""
+    set_sent = getattr(controller, "set_sent", None)
+    if callable(set_sent):
+        set_sent(duty)
+
+
 class SupervisedController:
     """A controller that a supervisor watches, from measured values to the inputs of the plant.
 
@@ -25,7 +32,8 @@ class SupervisedController:
     ----------
     controller : object
         Anything with ``step(reference_deg, measured_deg) -> duty``: `Pid`, `SlidingMode`, one of your own. It is not
-        stepped while the bridge is open; ``reset()`` is called when it starts again, where there is one.
+        stepped while the bridge is open; ``reset()`` is called when it starts again, and ``set_sent(duty)`` with what
+        left, where there are such.
     supervisor : ThrottleSupervisor, optional
         With the settings of the throttle; the defaults fit ``P1``.
 
@@ -89,6 +97,8 @@ class SupervisedController:
             sensor_fault=bool(values.get("fault", False)),
         )
         duty, bridge_open = self.supervisor.decide(0.0 if was_open else self.controller.step(reference, measured))
+        if not bridge_open:
+            note_sent(self.controller, duty)
         return {"duty": duty, "bridge_open": float(bridge_open)}
 
     def acknowledge(self) -> str:

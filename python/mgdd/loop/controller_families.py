@@ -131,10 +131,12 @@ class Family:
     label: str
     space: Mapping[str, tuple[float, float, bool]]  # lower, upper, as a logarithm
     build: Callable[[Groups, Mapping[str, float], Setup], Controller]
-    knows_delay: bool = True
+    loop_gains: tuple[str, ...] = ()  # numbers that a throttle of twice the gain wants half of
     longest_sample_s: float = 2e-3
     longest_dead_s: float = 2.5e-3
 
+
+_TUNED_SAMPLE_S, _DERIVATIVE_LAG_S = 1e-3, 3e-3  # of the shipped numbers, with a delay of one; of the measured speed
 
 # A bias that learns faster than this, per sample and over what a sample of acceleration moves, chases its own delay.
 _MOST_BIAS = 0.1
@@ -173,12 +175,18 @@ def _mgdd1(groups: Groups, x: Mapping[str, float], setup: Setup) -> Mgdd1:
     )
 
 
+def slowed(setup: Setup) -> float:
+    """Give the factor of time by which a loop without a model is slower, so that its dead time costs as much phase."""
+    dead_s = (setup.delay_samples + 0.5) * setup.sample_s + _DERIVATIVE_LAG_S
+    return min(1.0, (1.5 * _TUNED_SAMPLE_S + _DERIVATIVE_LAG_S) / dead_s)
+
+
 def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
-    gains = {}
+    gains, slower = {}, slowed(setup)
     for side in _SIDES:
-        gains[f"proportional_{side}_per_deg"] = x["proportional"] / 90.0
-        gains[f"integral_{side}_per_deg_s"] = x["integral_per_s"] / 90.0
-        gains[f"derivative_{side}_s_per_deg"] = x["derivative_s"] / 90.0
+        gains[f"proportional_{side}_per_deg"] = slower**2 * x["proportional"] / 90.0
+        gains[f"integral_{side}_per_deg_s"] = slower**3 * x["integral_per_s"] / 90.0
+        gains[f"derivative_{side}_s_per_deg"] = slower * x["derivative_s"] / 90.0
     return Pid(
         sample_s=setup.sample_s,
         kick=min(x["kick"] * groups.plate.friction, 1.0),
@@ -194,6 +202,14 @@ def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
 
 def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> SlidingMode:
     own = {**x, "friction": min(x["friction"] * groups.plate.friction, 1.0)}
+    slower = slowed(setup)
+    # The rate of the surface inside its layer, with what implicit switching adds to it.
+    push, tuned_s = x["switching"] * groups.plate.gain_deg_per_s2, _TUNED_SAMPLE_S
+    rate_per_s = push / (x["layer_deg"] * x["bandwidth_per_s"] + tuned_s * push)
+    own["bandwidth_per_s"] *= slower
+    own["integral_per_s"] *= slower
+    own["reference_pole_per_s"] *= slower
+    own["layer_deg"] = max(push / (slower * rate_per_s) - setup.sample_s * push, 0.0) / own["bandwidth_per_s"]
     return SlidingMode(sample_s=setup.sample_s, reaching="implicit", **own, **groups.spring, **groups.motion)
 
 
@@ -246,8 +262,9 @@ FAMILIES: Mapping[str, Family] = {
             "friction": (0.0, 1.5, False),
         },
         _pid,
-        knows_delay=False,
-        longest_dead_s=1.5e-3,
+        loop_gains=("proportional", "integral_per_s", "derivative_s"),
+        longest_sample_s=5e-3,
+        longest_dead_s=7e-3,
     ),
     "sliding_mode": Family(
         "sliding mode",
@@ -261,9 +278,8 @@ FAMILIES: Mapping[str, Family] = {
             "integral_layers": (0.3, 5.0, True),
         },
         _sliding_mode,
-        knows_delay=False,
         longest_sample_s=5e-3,
-        longest_dead_s=3e-3,
+        longest_dead_s=7.5e-3,
     ),
     "linear_mpc": Family(
         "linear MPC",

@@ -44,7 +44,8 @@ def tuned_controller(
         Time between samples [s], and standard deviation of the measured angle [deg].
     delay_samples : int, optional
         Samples of `sample_s` from a duty to its effect. Left out: the delay of the model in seconds, to the nearest
-        sample, or 1 where the model has none. ``pid`` and ``sliding_mode`` cannot know a delay.
+        sample, or 1 where the model has none. ``pid`` and ``sliding_mode`` predict nothing: a longer delay, as a longer
+        sample, makes them slower by as much as keeps the phase.
 
     Returns
     -------
@@ -54,8 +55,7 @@ def tuned_controller(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown kind, a model without groups, unknown numbers; a delay for a kind that cannot know one and whose
-        shipped numbers work with shorter ones only.
+        An unknown kind, a model without groups, unknown numbers.
 
     Examples
     --------
@@ -63,8 +63,6 @@ def tuned_controller(
     >>> {kind: type(tuned_controller(kind)).__name__ for kind in ("guided", "pid", "nmpc")}
     {'guided': 'GuidedPredictive', 'pid': 'Pid', 'nmpc': 'GuidedPredictive'}
     """
-    if numbers is None:
-        require_known_delay(kind, sample_s, delay_samples or 0)
     controller, doubts = tuned_with_doubts(
         kind, model, numbers=numbers, sample_s=sample_s, delay_samples=delay_samples, noise_deg=noise_deg
     )
@@ -98,19 +96,6 @@ def tuned_with_doubts(
     if numbers is not None:
         return controller, ()
     return controller, _doubts(kind, family, sample_s, delay_samples)
-
-
-def require_known_delay(kind: str, sample_s: float, delay_samples: int) -> None:
-    """Raise ParameterError where a kind that takes no delay is given one beyond that of its shipped numbers."""
-    family = family_of(kind)
-    if delay_samples <= 0 or family.knows_delay or _dead_s(sample_s, delay_samples) <= family.longest_dead_s:
-        return
-    knowing = ", ".join(name for name, one in FAMILIES.items() if one.knows_delay)
-    raise ParameterError.of(
-        "delay_samples", delay_samples,
-        f"left out with {kind!r}, which takes no delay, and whose shipped numbers work with shorter ones only; take "
-        f"{knowing}, or numbers that tune_controller({kind!r}, ..., delay_samples=...) finds",
-    )  # fmt: skip
 
 
 _SAME = 1.0 + 1e-9  # of two times
@@ -158,9 +143,12 @@ def tuned_sets() -> Mapping[str, Mapping[str, Mapping[str, float]]]:
 
 
 def shipped_numbers(kind: str, groups: Groups) -> dict[str, float]:
-    """Give the tuned numbers of the preset whose groups are nearest."""
+    """Give the tuned numbers of the preset whose groups are nearest, at the gain of these."""
     from mgdd import presets
 
     sets = tuned_sets()[kind]
-    near = min(sets, key=lambda name: _distance(groups, groups_of(presets.load(name, kind="throttle").throttle)))
-    return dict(sets[near])
+    known = {name: groups_of(presets.load(name, kind="throttle").throttle) for name in sets}
+    near = min(sets, key=lambda name: _distance(groups, known[name]))
+    more = groups.plate.gain_deg_per_s2 / known[near].plate.gain_deg_per_s2
+    gains = FAMILIES[kind].loop_gains
+    return {name: value / more if name in gains else value for name, value in sets[near].items()}

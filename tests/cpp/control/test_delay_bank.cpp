@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -160,6 +161,43 @@ TEST(GuidedPredictive, TheLongestDelayLeavesNoMembers) {
   GuidedPredictive controller(s);
   swing(controller, 20);
   EXPECT_EQ(controller.delay_samples(), longest_control_delay);
+}
+
+/// Most samples by which the delay was misjudged behind a gate that clamps and slews, over ten steps.
+template <class T>
+int misjudged_behind_a_gate(BasicGuidedPredictive<T>& controller, bool told) {
+  Plant plant(asymmetric().plate, 20.0);
+  double left = 0.1;
+  int most = 0;
+  for (int k = 0; k < 4000; ++k) {
+    const double measured = plant.angle_deg() + 0.04 * std::sin(1.7 * k * k);
+    const auto asked = double(controller.step(T(k / 400 % 2 == 0 ? 20.0 : 60.0), T(measured)));
+    left = std::clamp(std::clamp(asked, -0.3, 0.3), left - 0.012, left + 0.012);
+    if (told) controller.set_sent(T(left));
+    plant.step(left);
+    most = std::max(most, controller.delay_samples() - controller.settings().delay_samples);
+  }
+  return most;
+}
+
+TEST(GuidedPredictive, WhatAGateChangedIsNoDelay) {
+  GuidedPredictive told(asymmetric()), left_alone(asymmetric());
+  BasicGuidedPredictive<float> narrow(asymmetric());
+  EXPECT_EQ(misjudged_behind_a_gate(told, true), 0);
+  EXPECT_EQ(misjudged_behind_a_gate(narrow, true), 0);
+  EXPECT_GT(misjudged_behind_a_gate(left_alone, false), 0);
+}
+
+TEST(GuidedPredictive, TheDutyThatLeftAsAskedChangesNothing) {
+  GuidedPredictive told(asymmetric()), plain(asymmetric());
+  Plant plant(asymmetric().plate, 30.0);
+  for (int k = 0; k < 1500; ++k) {
+    const double duty = told.step(driving(k), plant.angle_deg());
+    ASSERT_EQ(duty, plain.step(driving(k), plant.angle_deg())) << k;
+    told.set_sent(duty);
+    told.set_sent(std::numeric_limits<double>::quiet_NaN());
+    plant.step(duty);
+  }
 }
 
 }  // namespace

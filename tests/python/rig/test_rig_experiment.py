@@ -246,20 +246,27 @@ def test_identification_finds_the_throttle_and_keeps_the_model(tmp_path: Path) -
 
 
 def test_the_controller_of_a_run_takes_the_delay_of_its_model_and_doubts_are_told(tmp_path: Path) -> None:
-    """The model of a log at 2 ms with two samples of delay: four of the run's; a preset has none."""
-    groups = {**FirstPrincipleModel().parameters, "delay_samples": 2.0}
+    """The model of a log at 2 ms with four samples of delay: eight of the run's; a preset has none."""
+    groups = {**FirstPrincipleModel().parameters, "delay_samples": 4.0}
     (tmp_path / "late.toml").write_text(FirstPrincipleModel(parameters=groups, sample_s=2e-3).to_toml())
     late = TRACK + f'model = "{tmp_path / "late.toml"}"\n'
-    for text, delay in ((TRACK, 0), (late, 4), (late + "delay_samples = 1\n", 1)):
+    for text, delay in ((TRACK, 0), (late, 8), (late + "delay_samples = 1\n", 1)):
         plan = check_experiment(experiment(text.replace('"pid"', '"guided"'))).plan
         assert isinstance(plan, TrackPlan)
         assert plan.controller().settings["delay_samples"] == delay  # type: ignore[attr-defined]
-        assert plan.doubts == ()
     known = check_experiment(experiment(late))
-    assert "delay_samples = 4 at sample_s = 0.001: the numbers of 'pid'" in known.to_dict()["warnings"][0]
+    assert "delay_samples = 8 at sample_s = 0.001: the numbers of 'pid'" in known.to_dict()["warnings"][0]
     assert run_experiment(known).figures["warnings"] == known.to_dict()["warnings"]
-    with pytest.raises(ParameterError, match=r"delay_samples = 3: must be left out with 'pid'"):
-        check_experiment(experiment(TRACK + "delay_samples = 3\n"))
+    assert check_experiment(experiment(TRACK + "delay_samples = 3\n")).to_dict()["warnings"] == []
+
+
+def test_a_clamp_of_the_gate_is_no_delay_of_the_plate(tmp_path: Path) -> None:
+    """Where the controller does not hear of it, the duty moves by 2.2 to 4.5, and by 7 to 38 without the bounds."""
+    (tmp_path / "tight.toml").write_text(SafetyEnvelope(duty_limit=0.35).to_toml())
+    text = TRACK.replace('"pid"', '"guided"') + f'[safety]\nenvelope = "{tmp_path / "tight.toml"}"\n'
+    figures = run_experiment(experiment(text + "[plant]\nscale = { coulomb_nm = 1.2 }\n")).figures
+    assert figures["total_variation"] < 1.8
+    assert figures["settling_ms"] < 120.0
 
 
 @pytest.mark.parametrize("guide", ["curve", "feed_forward", "none"])

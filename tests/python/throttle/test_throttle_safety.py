@@ -232,7 +232,13 @@ def test_a_supervisor_without_a_fault_changes_no_bit(kind):
 
 
 class Mine:
-    """A controller of a user: proportional, without reset."""
+    """A controller of a user: proportional, without reset; it keeps what left."""
+
+    def __init__(self) -> None:
+        self.sent: list[float] = []
+
+    def set_sent(self, duty: float) -> None:
+        self.sent.append(duty)
 
     def step(self, reference_deg: float, measured_deg: float) -> float:
         return 0.15 + 0.02 * (reference_deg - measured_deg) if measured_deg < 35.0 else math.nan
@@ -240,13 +246,17 @@ class Mine:
 
 def test_any_controller_can_be_watched_and_its_nan_opens_the_bridge():
     plant = VirtualThrottle(inputs=("duty", "bridge_open"), seed=2)
-    loop, values, modes = SupervisedController(Mine()), {"first_angle_deg": 8.0, "second_angle_deg": 8.0}, []
+    mine, orders = Mine(), []
+    loop, values, modes = SupervisedController(mine), {"first_angle_deg": 8.0, "second_angle_deg": 8.0}, []
     for _ in range(1000):
-        plant.apply(loop.step(60.0, values))
+        orders.append(loop.step(60.0, values))
+        plant.apply(orders[-1])
         values = plant.measure().values
         modes.append(loop.supervisor.mode)
     assert loop.supervisor.reason == "invalid_duty"
     assert modes.count("holding") == 19
+    assert mine.sent == [order["duty"] for order in orders if not order["bridge_open"]]
+    assert np.isfinite(mine.sent).all()  # the controller had asked for NaN
     assert values["angle_deg"] == pytest.approx(8.0, abs=1.0)
     assert loop.acknowledge() == "none"
     with pytest.raises(ParameterError, match="controller"):

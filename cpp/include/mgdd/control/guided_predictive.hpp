@@ -46,6 +46,8 @@ class BasicGuidedPredictive {
 
   /// As made, with what was learnt forgotten.
   void reset() noexcept;
+  /// The duty that was really sent in the place of the last one, where a gate changed it. Ignored if not finite.
+  void set_sent(T duty) noexcept;
   /// Takes over from a duty at rest, what was learnt kept. Ignored if a number is not finite.
   void take_over(T measurement_deg, T duty) noexcept;
 

@@ -84,6 +84,11 @@ class Mgdd1 {
     return duty_;
   }
 
+  /// The duty that was really sent in the place of the last one, where a gate changed it. Ignored if not finite.
+  void set_sent(T duty) noexcept {
+    if (started_) correct_sent(sent_, duty_, settings_.duty, duty);
+  }
+
   void reset() noexcept {
     started_ = false;
     reference_.forget();

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "mgdd/common/state.hpp"
+#include "mgdd/control/duty_range.hpp"
 #include "mgdd/dynamics/delay_line.hpp"
 
 namespace mgdd::control {
@@ -14,6 +16,15 @@ inline constexpr int longest_control_delay = 20;  ///< samples from a duty to it
 
 template <class T>
 using SentDuties = dynamics::DelayLine<T, longest_control_delay + 1>;
+
+/// Puts what really left in the place of the last duty asked for; the line keeps it without the trim that is in both.
+template <class T>
+void correct_sent(SentDuties<T>& sent, T& asked, const DutyRange& range, T left) noexcept {
+  if (!std::isfinite(left)) return;
+  left = range.clamp(left);
+  sent.before[0] += left - asked;
+  asked = left;
+}
 
 template <class Line, class V>
 void visit_sent(Line& sent, V& v) {

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mgdd import _core
+from mgdd.control.supervised import note_sent
 from mgdd.errors import DataError
 from mgdd.loop import Measurement
 from mgdd.rig.can.signal_map import LOOP_NAMES
@@ -175,6 +176,7 @@ def replayed(
         asked = float(controller.step(row["reference_deg"], angle_deg)) if driven else _NOTHING
         drive = gate.command(asked if gate.mode == "run" else 0.0)
         if driven:
+            note_sent(controller, drive.duty)
             pairs = ((asked, row["asked_duty"]), (drive.duty, row["duty"]))
             sizes.append(max(_distance(*pair) for pair in pairs))
         if driven or again["cycle"]:

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core, identify, presets
+from mgdd.control.supervised import note_sent
 from mgdd.errors import ParameterError
 from mgdd.io import throttle_log
 from mgdd.loop import Plant, Reference
 from mgdd.loop.controller_families import groups_of
 from mgdd.loop.track import FIGURES
-from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
+from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
@@ -80,7 +81,6 @@ class TrackPlan:
         self.model: Any = (
             identify.load_throttle_model(beside(folder, model)) if fitted else throttle_named(model, folder)
         )
-        require_known_delay(task.controller, sample_s, task.delay_samples or 0)
         _, self.doubts = self._made()
 
     def controller(self) -> AngleController:
@@ -102,7 +102,8 @@ class TrackPlan:
         def duty_at(sample: int, measured_deg: float) -> float:
             return float(controller.step(float(reference_deg[sample]), measured_deg))
 
-        columns, interrupted = _drive(plant, fewer(self.samples, most), duty_at, first_angle_deg)
+        sent = partial(note_sent, controller)
+        columns, interrupted = _drive(plant, fewer(self.samples, most), duty_at, first_angle_deg, sent)
         return self.outcome(columns, interrupted=interrupted)
 
     def outcome(self, columns: dict[str, NDArray[np.float64]], *, interrupted: bool) -> Outcome:
@@ -186,9 +187,16 @@ def fewer(samples: int, most: int | None) -> int:
 
 
 def _drive(
-    plant: Plant, samples: int, duty_at: Callable[[int, float], float], first_angle_deg: float
+    plant: Plant,
+    samples: int,
+    duty_at: Callable[[int, float], float],
+    first_angle_deg: float,
+    sent: Callable[[float], None] | None = None,
 ) -> tuple[dict[str, NDArray[np.float64]], bool]:
-    """Step a plant; give columns of what was asked, applied and measured, and whether Ctrl-C cut them."""
+    """Step a plant; give columns of what was asked, applied and measured, and whether Ctrl-C cut them.
+
+    ``sent`` is called with each duty that was applied.
+    """
     asked, applied, angle, true = (np.empty(samples) for _ in range(4))
     measured_deg, done, interrupted = first_angle_deg, 0, False
     try:
@@ -200,6 +208,8 @@ def _drive(
             true[sample] = measured.values.get("angle_deg", math.nan)
             asked[sample], applied[sample], angle[sample] = duty, measured.applied.get("duty", duty), measured_deg
             done = sample + 1
+            if sent is not None:
+                sent(float(applied[sample]))
     except KeyboardInterrupt:
         interrupted = True
     columns = {"asked_duty": asked[:done], "duty": applied[:done], "sensed_angle_deg": angle[:done]}
