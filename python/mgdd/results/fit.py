@@ -119,16 +119,17 @@ class Fit(Result):
 
     See Also
     --------
-    mgdd.identify.identify_throttle, mgdd.identify.fit_cylinder, mgdd.identify.fit_ode : make one.
+    mgdd.identify.identify_throttle, mgdd.identify.fit_cylinder, mgdd.identify.fit_model : make one.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import fit_ode
+    >>> from mgdd.identify import OdeModel, fit_model
     >>> time = np.linspace(0.0, 10.0, 201)
     >>> y = 2.0 * (1.0 - np.exp(-time / 0.5))
-    >>> fit = fit_ode(lambda t, x, u, p: (p[0] * u[0] - x) / p[1], {"time_s": time, "u": np.ones(201), "y": y},
-    ...               parameters={"gain": 1.0, "time_s": 1.0}, initial_state=[0.0])
+    >>> start = OdeModel(derivative=lambda t, x, u, p: (p[0] * u[0] - x) / p[1],
+    ...                  parameters={"gain": 1.0, "time_s": 1.0}, initial_state=(0.0,))
+    >>> fit = fit_model(start, {"time_s": time, "u": np.ones(201), "y": y})
     >>> round(fit.parameters["gain"], 3), fit.train.nrmse_fit_percent > 99.9
     (2.0, True)
     """

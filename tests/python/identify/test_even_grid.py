@@ -73,10 +73,10 @@ def circuit(time: np.ndarray[Any, Any]) -> object:
     return fit_linear(labelled_dataset({"time_s": ("time_s", time), **record}), order=1, iterations=1)
 
 
-def lag(_: float, x: Any, u: Any, p: Any) -> Any:
-    return (p[0] * u[0] - x) / p[1]
-
-
+LAG = identify.OdeModel(
+    derivative=lambda _, x, u, p: (p[0] * u[0] - x) / p[1], parameters={"gain": 1.0, "lag_s": 0.1},
+    initial_state=(8.0,), input_names=("duty",), output_names=("angle_deg",),
+)  # fmt: skip
 USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "throttle_log": lambda time: throttle_log(time, DUTY, ANGLE),
     "simulate": lambda time: simulate_throttle(Throttle(), DUTY, time_s=time),
@@ -91,10 +91,7 @@ USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "check_excitation": lambda time: identify.check_excitation(
         log(time), lambda _, duty, __: 30.0 + 100.0 * np.asarray(duty)
     ),
-    "fit_ode": lambda time: identify.fit_ode(
-        lag, log(time), input_names=["duty"], output_names=["angle_deg"], parameters={"gain": 1.0, "lag_s": 0.1},
-        initial_state=[8.0], options=ONCE,
-    ),
+    "fit_model": lambda time: identify.fit_model(LAG, log(time), options=ONCE),
     "drive": drive,
     "tanks": tanks,
     "circuit": circuit,

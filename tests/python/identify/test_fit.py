@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from mgdd import datasets, presets
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import fit_cylinder, fit_ode, identify_throttle
+from mgdd.identify import OdeModel, fit_cylinder, fit_model, identify_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.optimize.least_squares import fit_options
@@ -27,10 +27,6 @@ TIME = np.arange(4000) * 1e-3
 DUTY = 0.12 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + TIME))
 
 
-def lag(_t, x, u, p):
-    return (p[0] * u[0] - x) / p[1]
-
-
 def log() -> xr.Dataset:
     return FirstPrincipleModel().simulate({"time_s": TIME, "duty": DUTY}, initial_state={"angle_deg": 30.0})
 
@@ -40,11 +36,15 @@ def fits() -> dict[str, Fit]:
     once = FitOptions(n_starts=1)
     y = 2.0 * (1.0 - np.exp(-TIME / 0.5))
     record = {"time_s": TIME, "u": np.ones(TIME.size), "y": y}
-    start = {"parameters": {"gain": 1.0, "tau_s": 1.0}, "initial_state": [0.0]}
+    lag = OdeModel(
+        derivative=lambda _t, x, u, p: (p[0] * u[0] - x) / p[1],
+        parameters={"gain": 1.0, "tau_s": 1.0},
+        initial_state=(0.0,),
+    )
     return {
         "first_principle": identify_throttle(log(), "first_principle", test=log(), options=once),
         "pw_r": identify_throttle(log(), test=log(), limp_home_deg=8.0, options=once),
-        "ode": fit_ode(lag, record, **start),
+        "ode": fit_model(lag, record),
         "cylinder": fit_cylinder(datasets.read("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),
     }
 

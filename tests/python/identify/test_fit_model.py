@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import DiscreteModel, OdeModel, SimulatorModel, fit_model, fit_ode, profile_likelihood
+from mgdd.identify import DiscreteModel, OdeModel, SimulatorModel, fit_model, profile_likelihood
 from mgdd.identify.grey_box.search import Ties
 from mgdd.optimize import FitOptions
 
@@ -83,10 +84,8 @@ def test_a_function_of_the_state_gives_outputs_of_an_equation():
         substeps=2,
     )
     run = model.simulate({"time_s": TIME, "u": INPUT})
-    found = fit_ode(
-        oscillator, run, output=measured, output_names=["position_mm", "force_n"], initial_state=[0.1, 0.0], substeps=2,
-        parameters={"mass_kg": 1.0, "stiffness_n_per_m": 5.0}, sigma={"position_mm": 1.0, "force_n": 0.01},
-    )  # fmt: skip
+    start = dataclasses.replace(model, parameters={"mass_kg": 1.0, "stiffness_n_per_m": 5.0})
+    found = fit_model(start, run, sigma={"position_mm": 1.0, "force_n": 0.01})
     np.testing.assert_allclose(found.report.values, [1.5, 6.0], rtol=1e-6)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
-from mgdd.identify import OdeModel, fit_ode
+from mgdd.identify import OdeModel, fit_model
 from mgdd.optimize import FitOptions
 
 
@@ -18,43 +18,40 @@ def pendulum(_t, x, u, p):
     return x[1], p[0] * u[0] - p[1] * x[1] - p[2] * np.sin(x[0])
 
 
+SWINGING = OdeModel(
+    derivative=pendulum, parameters={"gain": 3.0, "damping": 0.4, "stiffness": 2.0}, initial_state=(0.2, -0.1)
+)
+START = {"gain": 2.0, "damping": 0.2, "stiffness": 1.0}
+
+
 def record(n=600, noise=0.0, seed=1):
     rng = np.random.default_rng(seed)
     time = 0.02 * np.arange(n)
     u = np.repeat(rng.uniform(-1, 1, n // 20 + 1), 20)[:n]
-    model = OdeModel(
-        derivative=pendulum,
-        output=lambda x, _u, _p: x[0],
-        parameters={"gain": 3.0, "damping": 0.4, "stiffness": 2.0},
-        initial_state=(0.2, -0.1),
-    )
-    return time, u, model.simulate({"time_s": time, "u": u})["y"].to_numpy() + noise * rng.standard_normal(n)
+    y = SWINGING.simulate({"time_s": time, "u": u})["y"].to_numpy() + noise * rng.standard_normal(n)
+    return {"time_s": time, "u": u, "y": y}
 
 
-def fit(time, u, y, **options):
+def fit(measured, parameters=START, model=SWINGING, **options):
     settings = {
-        "parameters": {"gain": 2.0, "damping": 0.2, "stiffness": 1.0},
-        "initial_state": [y[0], 0.0],
+        "initial_state": [measured["y"][0], 0.0],
         "free_state": [0, 1],
         "bounds": {"gain": (0.1, 20.0), "damping": (0.01, 5.0), "stiffness": (0.1, 20.0)},
-        "log_scaled": ["gain", "damping", "stiffness"],
+        "log_scaled": list(START),
     }
-    return fit_ode(pendulum, {"time_s": time, "u": u, "y": y}, **(settings | options))
+    return fit_model(replace(model, parameters=parameters), measured, **(settings | options))
 
 
 def test_exact_data_give_back_parameters_and_start():
-    time, u, y = record()
-    found = fit(time, u, y)
+    measured = record()
+    found = fit(measured)
     assert found.report.success
     np.testing.assert_allclose(found.report.values, [3.0, 0.4, 2.0, 0.2, -0.1], rtol=1e-6)
-    np.testing.assert_allclose(found.model.simulate({"time_s": time, "u": u})["y"], y, atol=1e-7)
+    np.testing.assert_allclose(found.model.simulate(measured)["y"], measured["y"], atol=1e-7)
 
 
 def test_noise_gives_honest_errors_and_fixed_parameters_stay():
-    time, u, y = record(noise=0.01, seed=3)
-    found = fit(
-        time, u, y, sigma=0.01, free=["gain", "stiffness"], parameters={"gain": 2.0, "damping": 0.4, "stiffness": 1.0}
-    )
+    found = fit(record(noise=0.01, seed=3), START | {"damping": 0.4}, sigma=0.01, free=["gain", "stiffness"])
     assert found.report.names == ("gain", "stiffness", "state_0", "state_1")
     assert found.model.parameters["damping"] == 0.4
     assert found.report.rmse == pytest.approx(1.0, abs=0.1)
@@ -62,27 +59,14 @@ def test_noise_gives_honest_errors_and_fixed_parameters_stay():
 
 
 def test_many_starts_report_how_many_arrived():
-    time, u, y = record(200)
-    found = fit(
-        time,
-        u,
-        y,
-        options=FitOptions(n_starts=3),
-        bounds={
-            "gain": (1.0, 6.0),
-            "damping": (0.1, 1.0),
-            "stiffness": (0.5, 5.0),
-            "state_0": (-1, 1),
-            "state_1": (-1, 1),
-        },
-    )
+    box = {"gain": (1.0, 6.0), "damping": (0.1, 1.0), "stiffness": (0.5, 5.0), "state_0": (-1, 1), "state_1": (-1, 1)}
+    found = fit(record(200), options=FitOptions(n_starts=3), bounds=box)
     assert len(found.start_reports) == len(found.start_rmse) == 3
     assert 1 <= found.n_best <= 3
 
 
 def test_ctrl_c_leaves_the_best_of_the_finished_starts():
-    time, u, y = record(n=200)
-    calls = []
+    measured, calls, most = record(n=200), [], 10**9
 
     def counted(*arguments):
         calls.append(None)
@@ -90,54 +74,48 @@ def test_ctrl_c_leaves_the_best_of_the_finished_starts():
             raise KeyboardInterrupt
         return pendulum(*arguments)
 
+    model = replace(SWINGING, derivative=counted, parameters=START)
     box = {"gain": (1.0, 5.0), "damping": (0.1, 1.0), "stiffness": (1.0, 3.0)}
-    settings = {
-        "parameters": {"gain": 2.0, "damping": 0.2, "stiffness": 1.0},
-        "initial_state": [0.2, -0.1],
-        "bounds": box,
-    }
-    most = 10**9
-    alone = fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings)
+    alone = fit_model(model, measured, bounds=box)
     searched, most = len(calls), 10
     calls.clear()
     with pytest.raises(KeyboardInterrupt) as nothing:
-        fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings)
+        fit_model(model, measured, bounds=box)
     assert not isinstance(nothing.value, Interrupted)
     calls.clear()
     most = searched
     with pytest.raises(Interrupted) as stop:
-        fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings, options=FitOptions(n_starts=3))
+        fit_model(model, measured, bounds=box, options=FitOptions(n_starts=3))
     np.testing.assert_array_equal(stop.value.partial.report.values, alone.report.values)
     assert len(stop.value.partial.start_reports) == 1
 
 
 def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
-    time, u, y = record(100)
-    with pytest.raises(ParameterError, match="no parameter of this model"):
-        fit(time, u, y, log_scaled=["gane"])
-    with pytest.raises(ShapeError, match="one length"):
-        fit(time, u, y[:-1])
-    with pytest.raises(DataError, match="uneven sampling"):
-        fit(time**2, u, y)
-    with pytest.raises(DataError, match="y: sample 7"):
-        fit(time, u, np.where(np.arange(100) == 7, np.inf, y))
-    with pytest.raises(DataError, match="u: sample 7"):
-        fit(time, np.where(np.arange(100) == 7, np.nan, u), y)
-    with pytest.raises(DataError, match="y: every sample is missing"):
-        fit(time, u, np.full(100, np.nan), initial_state=[0.0, 0.0])
+    good, seventh = record(100), np.arange(100) == 7
+    for wrong, error, message in (
+        ({"y": good["y"][:-1]}, ShapeError, "one length"),
+        ({"time_s": good["time_s"] ** 2}, DataError, "uneven sampling"),
+        ({"y": np.where(seventh, np.inf, good["y"])}, DataError, "y: sample 7"),
+        ({"u": np.where(seventh, np.nan, good["u"])}, DataError, "u: sample 7"),
+        ({"y": np.full(100, np.nan)}, DataError, "y: every sample is missing"),
+    ):
+        with pytest.raises(error, match=message):
+            fit(good | wrong, initial_state=[0.0, 0.0])
     for name, value, error in (
-        ("interpolation", "spline", ParameterError),
+        ("log_scaled", ["gane"], ParameterError),
         ("input_delay_s", -0.1, ParameterError),
         ("input_delay_s", (0.2, 0.1), ParameterError),
         ("sigma", [0.1, 0.2], ShapeError),
-        ("sigma", np.where(np.arange(100) == 3, 0.0, 1.0), ParameterError),
+        ("sigma", np.where(seventh, 0.0, 1.0), ParameterError),
         ("initial_state", [[0.0, 0.0], [0.0, 0.0]], ShapeError),
     ):
-        with pytest.raises(error, match=name):
-            fit(time, u, y, **{name: value})
+        with pytest.raises(error, match="gane" if name == "log_scaled" else name):
+            fit(good, **{name: value})
+    with pytest.raises(ParameterError, match="interpolation"):
+        fit(good, model=replace(SWINGING, interpolation="spline"))
     with pytest.raises(ParameterError, match="no finite simulation"):
-        fit(time, u, y, parameters={"gain": 2.0, "damping": -1e9, "stiffness": 1.0}, bounds={}, log_scaled=[])
-    assert fit(time, u, y).report.success
+        fit(good, START | {"damping": -1e9}, bounds={}, log_scaled=[])
+    assert fit(good).report.success
 
 
 # --- what lies between the samples, before them, and in place of some -----------------------------------------
@@ -163,16 +141,16 @@ def spring(_t, x, u, p):
 
 
 TRUE = [0.5, 9.0, 4.0]
-GUESS = {"damping": 0.3, "stiffness": 8.0, "cubic": 1.0}
+GUESS = OdeModel(
+    derivative=spring, parameters={"damping": 0.3, "stiffness": 8.0, "cubic": 1.0}, initial_state=(0.3, 0.0),
+    substeps=2, interpolation="cubic",
+)  # fmt: skip
 
 
 def test_a_measured_input_is_read_between_its_samples():
-    record = shaken()
+    measured = shaken()
     lost = {
-        how: fit_ode(
-            spring, record, parameters=GUESS, initial_state=[0.3, 0.0], interpolation=how, substeps=2
-        ).train.rmse
-        for how in ("hold", "linear", "cubic")
+        how: fit_model(replace(GUESS, interpolation=how), measured).train.rmse for how in ("hold", "linear", "cubic")
     }
     assert lost["linear"] < lost["hold"] / 10
     assert lost["cubic"] < lost["linear"] / 20
@@ -180,19 +158,18 @@ def test_a_measured_input_is_read_between_its_samples():
 
 @pytest.mark.parametrize("how", ["linear", "cubic"])
 def test_a_delay_of_no_whole_samples_is_found_with_its_interval(how):
-    record = shaken(delay_s=0.187, seed=2, noise=0.003)
-    settings = {"parameters": GUESS, "initial_state": [0.3, 0.0], "interpolation": how, "substeps": 2}
-    found = fit_ode(spring, record, input_delay_s=(0.0, 0.5), **settings)
+    measured, model = shaken(delay_s=0.187, seed=2, noise=0.003), replace(GUESS, interpolation=how)
+    found = fit_model(model, measured, input_delay_s=(0.0, 0.5))
     assert found.report.names[-1] == "input_delay_s"
     low, high = found.report.interval(0.999)["input_delay_s"]
     assert low < 0.187 < high
     assert high - low < 0.02
-    again = fit_ode(spring, record, input_delay_s=found.model.input_delay_s, **settings)
+    again = fit_model(model, measured, input_delay_s=found.model.input_delay_s)
     np.testing.assert_allclose(again.report.values, found.report.values[:3], rtol=1e-3)
     with pytest.raises(ParameterError, match="input_delay_s"):
-        dataclasses.replace(found.model, input_delay_s=-0.1)
+        replace(found.model, input_delay_s=-0.1)
     read = OdeModel.from_toml(found.model.to_toml(), derivative=spring)
-    assert read.simulate(record)["y"].identical(found.model.simulate(record)["y"])
+    assert read.simulate(measured)["y"].identical(found.model.simulate(measured)["y"])
 
 
 def test_a_delay_of_held_inputs_moves_them_as_they_were_held():
@@ -204,27 +181,24 @@ def test_a_delay_of_held_inputs_moves_them_as_they_were_held():
     y = np.zeros(fine.size)
     for k in range(fine.size - 1):
         y[k + 1] = held[k] * 2.0 + (y[k] - held[k] * 2.0) * np.exp(-1e-4 / 0.6)
-    y = np.interp(time, fine, y)
-    found = fit_ode(
-        lambda _t, x, u, p: (p[0] * u[0] - x) / p[1],
-        {"time_s": time, "u": u, "y": y},
+    lag = OdeModel(
+        derivative=lambda _t, x, u, p: (p[0] * u[0] - x) / p[1],
         parameters={"gain": 1.0, "time_constant_s": 1.0},
-        initial_state=[0.0],
-        input_delay_s=(0.0, 0.8),
+        initial_state=(0.0,),
         substeps=8,
     )
+    found = fit_model(lag, {"time_s": time, "u": u, "y": np.interp(time, fine, y)}, input_delay_s=(0.0, 0.8))
     np.testing.assert_allclose(found.report.values, [2.0, 0.6, 0.237], rtol=2e-3)
 
 
 def test_missing_samples_and_surer_ones_count_as_they_should():
-    record = shaken(seed=4, noise=0.002)
+    measured = shaken(seed=4, noise=0.002)
     draw = np.random.default_rng(5)
     poor = np.arange(400) % 3 == 1
-    record["y"] = np.where(poor, record["y"] + 0.2 * draw.standard_normal(400), record["y"])
-    settings = {"parameters": GUESS, "initial_state": [0.3, 0.0], "interpolation": "cubic", "substeps": 2}
-    weighted = fit_ode(spring, record, sigma=np.where(poor, 0.2, 0.002), **settings)
-    alike = fit_ode(spring, record, **settings)
-    without = fit_ode(spring, {**record, "y": np.where(poor, np.nan, record["y"])}, sigma=0.002, **settings)
+    measured["y"] = np.where(poor, measured["y"] + 0.2 * draw.standard_normal(400), measured["y"])
+    weighted = fit_model(GUESS, measured, sigma=np.where(poor, 0.2, 0.002))
+    alike = fit_model(GUESS, measured)
+    without = fit_model(GUESS, {**measured, "y": np.where(poor, np.nan, measured["y"])}, sigma=0.002)
     assert np.abs(weighted.report.values - TRUE).max() < 0.2 * np.abs(alike.report.values - TRUE).max()
     np.testing.assert_allclose(weighted.report.values, without.report.values, rtol=2e-3)
     assert without.report.rmse == pytest.approx(1.0, abs=0.15)
@@ -234,19 +208,19 @@ def test_missing_samples_and_surer_ones_count_as_they_should():
 def test_several_records_share_parameters_and_each_has_its_start():
     starts = [(0.3, 0.0), (-0.6, 1.0), (0.0, -0.4)]
     records = [shaken(70 * k + 90, seed=k, noise=0.002, start=at) for k, at in enumerate(starts)]
-    settings = {"parameters": GUESS, "interpolation": "cubic", "substeps": 2, "free_state": [0, 1]}
-    found = fit_ode(spring, records, initial_state=np.zeros((3, 2)), **settings)
+    settings = {"initial_state": np.zeros((3, 2)), "free_state": [0, 1]}
+    found = fit_model(GUESS, records, **settings)
     assert found.report.names[3:5] == ("state_0_of_0", "state_1_of_0")
     assert np.all(np.abs(found.report.values - [*TRUE, *np.ravel(starts)]) < 5 * found.report.stderr)
     levels = [np.full(each["y"].size, 0.002) for each in records]
-    known = fit_ode(spring, records, initial_state=np.zeros((3, 2)), sigma=levels, **settings)
+    known = fit_model(GUESS, records, sigma=levels, **settings)
     np.testing.assert_allclose(known.report.values, found.report.values, rtol=1e-6)
     assert known.report.rmse == pytest.approx(1.0, abs=0.1)
     with pytest.raises(ShapeError, match="sigma"):
-        fit_ode(spring, records, initial_state=np.zeros((3, 2)), sigma=levels[:2], **settings)
-    one = fit_ode(spring, records[0], initial_state=[0.0, 0.0], **settings)
+        fit_model(GUESS, records, sigma=levels[:2], **settings)
+    one = fit_model(GUESS, records[0], initial_state=[0.0, 0.0], free_state=[0, 1])
     assert np.all(found.report.stderr[:3] < one.report.stderr[:3])
-    reversed_ = fit_ode(spring, records[::-1], initial_state=np.zeros((3, 2)), **settings)
+    reversed_ = fit_model(GUESS, records[::-1], **settings)
     np.testing.assert_allclose(reversed_.report.values[:3], found.report.values[:3], rtol=1e-6)
 
 
@@ -259,11 +233,8 @@ def test_intervals_hold_where_the_residual_is_correlated():
         for seed in range(records[memory]):
             draw = 0.01 * np.random.default_rng(seed).standard_normal(600)
             noise = lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], draw)
-            record = {**clean, "y": clean["y"] + noise}
-            found = fit_ode(
-                spring, record, parameters=GUESS, initial_state=[0.3, 0.0], interpolation="cubic", substeps=2
-            )
-            ends = np.array([found.report.interval(0.95)[name] for name in GUESS])
+            found = fit_model(GUESS, {**clean, "y": clean["y"] + noise})
+            ends = np.array([found.report.interval(0.95)[name] for name in GUESS.parameters])
             inside.append((ends[:, 0] < TRUE) & (ends[:, 1] > TRUE))
     assert np.mean(held[0.0]) > 0.85
     assert np.mean(held[0.94]) > 0.85

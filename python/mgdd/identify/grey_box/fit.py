@@ -15,8 +15,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify.grey_box.model import GreyBoxModel
 from mgdd.identify.grey_box.models import at_estimates
 from mgdd.identify.grey_box.records import records_of, states_of
-from mgdd.identify.grey_box.search import Search, Unknowns
-from mgdd.identify.grey_box.shooting import check_shooting, shoot
+from mgdd.identify.grey_box.search import Search, Unknowns, check_shooting, shoot
 from mgdd.optimize.least_squares import FitOptions, fit_of, fit_options, fit_run, quality_of, spread_starts
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.results import Fit

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.grey_box.drive import Acting
-from mgdd.identify.grey_box.functions import Rows, check_columns, rows_of
-from mgdd.identify.grey_box.model import GreyBoxModel
+from mgdd.identify.grey_box.model import Acting, GreyBoxModel, Rows, check_columns, rows_of
 from mgdd.io.parameters import Wanted
 from mgdd.results.describe import described
 from mgdd.signals.even_grid import is_same_step

@@ -67,7 +67,7 @@ def profile_likelihood(fit: Fit, name: str, *, level: float = 0.95) -> Likelihoo
     Parameters
     ----------
     fit : mgdd.results.Fit
-        A fit of `fit_model` or `fit_ode`.
+        A fit of `fit_model`.
     name : str
         One of the estimated parameters.
     level : float
@@ -99,7 +99,7 @@ def profile_likelihood(fit: Fit, name: str, *, level: float = 0.95) -> Likelihoo
     True
     """
     if not isinstance(fit, GreyBoxFit):
-        raise ParameterError("fit: must be one of fit_model or fit_ode, whose search a profile repeats")
+        raise ParameterError("fit: must be one of fit_model, whose search a profile repeats")
     ParameterError.unless(0.0 < level < 1.0, "level", level, "between 0 and 1")
     names = fit.report.names
     ParameterError.unless(name in names, "name", name, f"one of the estimated {', '.join(names)}")

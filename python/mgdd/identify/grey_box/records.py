@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mgdd._arguments import as_floats
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.grey_box.drive import Drive
-from mgdd.identify.grey_box.model import GreyBoxModel
+from mgdd.identify.grey_box.model import Drive, GreyBoxModel
 from mgdd.signals.even_grid import is_same_step
 from mgdd.signals.model import check_horizon, columns_of, table_of
 
