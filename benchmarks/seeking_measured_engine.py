@@ -24,10 +24,9 @@ from dataclasses import replace
 import numpy as np
 
 from mgdd import datasets
-from mgdd.loop import Measurement, SurrogatePlant, run_seeker
+from mgdd.loop import Measurement, run_seeker
 from mgdd.optimize import ComponentLag, GaussianProcessSeeking, Limit
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant, fit_surrogate
 from mgdd_studies.measured_engine_cases import lag_of
 
 NOX = "nox_ppm"

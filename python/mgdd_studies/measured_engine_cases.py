@@ -13,11 +13,10 @@ from mgdd import datasets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import ConvergenceError, DataError
 from mgdd.guide import Curve, ModelOptimum
-from mgdd.loop import SurrogatePlant
 from mgdd.optimize import ComponentLag, ExtremumSeeking, GoldenSection, Limit, Seeker, Spsa, tune
 from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.tuning import Tuning
-from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant
 
 if TYPE_CHECKING:
     import xarray as xr

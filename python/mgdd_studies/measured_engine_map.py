@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import SurrogatePlant, seek_map
-from mgdd.surrogate import fit_response, fit_surrogate
+from mgdd.loop import seek_map
+from mgdd.surrogate import fit_response
+from mgdd_studies.measured_engine import SurrogatePlant, fit_surrogate
 from mgdd_studies.statistics import mean_interval
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.loop.map_result import MapSearch
-    from mgdd.surrogate.surrogate import EngineSurrogate
+    from mgdd_studies.measured_engine import EngineSurrogate
 
     Array = NDArray[np.float64]
 

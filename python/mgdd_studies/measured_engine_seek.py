@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import SurrogatePlant, run_seeker
+from mgdd.loop import run_seeker
 from mgdd.plot.style import BLACK, GREY, LINE_STYLES, axis_label, legend, minus, new_figure
 from mgdd.results.labels import labelled_dataset
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant, fit_surrogate
 from mgdd_studies.measured_engine_cases import (
     ARRIVAL_CAD,
     LOWER_CAD,

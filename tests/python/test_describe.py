@@ -19,23 +19,19 @@ from mgdd.identify import OdeModel, check_excitation, fit_cylinder, validate_thr
 from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io import throttle_log
-from mgdd.loop import SensorDynamics, SurrogatePlant, VirtualEngine, run_seeker
+from mgdd.loop import SensorDynamics, VirtualEngine, run_seeker
 from mgdd.maps import CalibrationMap
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets.preset import Preset
 from mgdd.results.describe import Row, as_html, as_text, picture_of, rows_of
 from mgdd.results.units import unit_of
 from mgdd.signals import chirp
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.fit import random_step_records
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, simulate_throttle
 from mgdd_studies.benchmarks.drive_axis import slide_model
 from mgdd_studies.benchmarks.wiener_hammerstein import LinearFilter
 
 
 def objects() -> dict[str, Callable[[], Any]]:
-    def surrogate() -> Any:
-        return fit_surrogate(random_step_records(1500))
 
     def log() -> Any:
         signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
@@ -75,12 +71,6 @@ def objects() -> dict[str, Callable[[], Any]]:
         "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, initial_state=(0.0,)),
         "drive": lambda: slide_model({"mass_kg": 95.0}, force_n_per_v=35.0),
         "filter": lambda: LinearFilter(4).model(np.ones(5), np.ones(5), 0.0, 0.0),
-        "surrogate": surrogate,
-        "support": lambda: surrogate().support,
-        "signal": lambda: surrogate().signals["nox_ppm"],
-        "lag": lambda: surrogate().signals["nox_ppm"].sensor,
-        "best": lambda: surrogate().find_optimum("imep_bar"),
-        "surrogate engine": lambda: SurrogatePlant(surrogate()),
         "fit": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)),
         "report": lambda: fit_groups(log(), delays=[0.0], options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),

@@ -61,8 +61,6 @@ from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.rig.realtime import RingTransport
-from mgdd.surrogate.fit import random_step_records
-from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, characteristics, simulate_throttle
 from realtime_loops import make_loop
@@ -148,10 +146,6 @@ def validation() -> ThrottleValidation:
     return identify.validate_throttle(model, log())
 
 
-def of_records() -> EngineSurrogate:
-    return surrogate.fit_surrogate(random_step_records(1500))
-
-
 def planned(**options: Any) -> xr.Dataset:
     return design.design_points({"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0), "gear": {2, 4, 5}}, **options)
 
@@ -233,8 +227,6 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "surrogate.fit_response.diagnostics": lambda _: surrogate.fit_response(
         {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}, "imep_bar", degree=1
     ).diagnostics,
-    "surrogate.EngineSurrogate.predict": lambda _: of_records().predict([-4.0, 0.0]),
-    "surrogate.EngineSurrogate.quality": lambda _: of_records().quality(),
     "identify.ExcitationCheck.prediction": lambda _: identify.check_excitation(
         signals.chirp(offset=0.15, amplitude=0.1), Throttle()
     ).prediction,
@@ -252,7 +244,6 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "guide.GuidedEngine.history": lambda _: guided_engine().history,
     "guide.OnlineCalibration.history": lambda _: taught().history,
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
-    "surrogate.random_step_records": lambda _: random_step_records(50),
     "io.Encoder.angle": lambda _: wheel_angle(),
     "io.pressure_chunks": lambda folder: list(pressure_chunks(pressure_file(folder))),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),

@@ -23,7 +23,7 @@ from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignit
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration
 from mgdd.identify.throttle.automatic import fit_groups
-from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, seek_map, tune_controller
+from mgdd.loop import VirtualEngine, run_seeker, seek, seek_front, seek_map, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.plot.response import response_diagnostics
@@ -33,10 +33,10 @@ from mgdd.results.result import Result
 from mgdd.rig import Experiment, Recorder, read_record, run_experiment
 from mgdd.rig.experiment.self_test import WAYS_OF, SelfTest
 from mgdd.signals import chirp
-from mgdd.surrogate import fit_response, fit_surrogate
-from mgdd.surrogate.fit import random_step_records
+from mgdd.surrogate import fit_response
 from mgdd.throttle import Throttle, simulate_throttle
 from mgdd_studies import run_study
+from mgdd_studies.measured_engine import SurrogatePlant, fit_surrogate, random_step_records
 from public_objects import MODULES
 
 EXPERIMENT = 'kind = "experiment"\nformat = 1\ntask = "track"\nmode = "simulate"\n'

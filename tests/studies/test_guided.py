@@ -11,10 +11,10 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels
-from mgdd.surrogate import fit_surrogate
 from mgdd_studies import run_study
 from mgdd_studies.base import StudyResult
 from mgdd_studies.guided import LimitedRuns, limited_parts
+from mgdd_studies.measured_engine import fit_surrogate
 from mgdd_studies.measured_engine_cases import measured_guide
 
 needs_records = pytest.mark.skipif("h2df_502" not in datasets.names(), reason="MGDD_DATA_DIR holds no folder h2df_502")

@@ -11,11 +11,9 @@ import pytest
 from mgdd import datasets
 from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.fit import random_step_records
-from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd_studies import measured_engine_cases, measured_engine_seek, run_study
 from mgdd_studies.base import StudyResult
+from mgdd_studies.measured_engine import EngineSurrogate, fit_surrogate, random_step_records
 from mgdd_studies.measured_engine_map import MapJudge, guide_of, held_steps, sought
 from mgdd_studies.measured_engine_seek import run_measured_engine_seek
 

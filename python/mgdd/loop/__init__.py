@@ -1,7 +1,7 @@
 """Closed loops: plants behind one protocol, a seeker on any of them, and thousands of runs on the virtual bench.
 
-`VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and `FunctionPlant`, a function of your own, are plants: ``apply``
-inputs by name, ``measure``. `run_seeker` closes the loop on any of them and on a test rig, `monte_carlo` does so for
+`VirtualEngine`, `VirtualThrottle` and `FunctionPlant`, a function of your own, are plants: ``apply`` inputs by name,
+``measure``. `run_seeker` closes the loop on any of them and on a test rig, `monte_carlo` does so for
 seeds, gains and operating points of the bench, or on a compiled function, on all cores or an executor,
 `VirtualEngine.find_optimum` says where a seeker should end. `track` and `track_many` run controllers of the throttle
 along a `Reference`, `export_controller` writes one as C++, `simulate_drive` runs a throttle between the pedal and the
@@ -25,7 +25,6 @@ from mgdd.loop.seek import seek
 from mgdd.loop.seek_front import seek_front
 from mgdd.loop.seek_map import seek_map
 from mgdd.loop.summary import LoopCriteria
-from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
@@ -42,7 +41,6 @@ __all__ = [
     "Plant",
     "Reference",
     "SensorDynamics",
-    "SurrogatePlant",
     "ThrottleFault",
     "VirtualEngine",
     "VirtualTestBed",

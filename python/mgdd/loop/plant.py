@@ -66,7 +66,7 @@ class Measurement:
 class Plant(Protocol):
     """Takes inputs by name, gives back what was measured.
 
-    `VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; so is a class of yours
+    `VirtualEngine`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; so is a class of yours
     with these members. One that also has `objective`, weights of quantities by name, names J in figures and texts.
 
     Examples

@@ -126,17 +126,6 @@ def support_of(
     return Support(inputs=inputs, lower=lower, upper=upper, leverage_limit=limit, basis=basis, root=root)
 
 
-def least_squares_of(terms: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least-squares coefficients, by normal equations: the terms are standardised, so few digits go."""
-    return np.asarray(np.linalg.solve(terms.T @ terms, terms.T @ values), dtype=np.float64)
-
-
-def r_squared(values: NDArray[np.float64], model: NDArray[np.float64]) -> float:
-    """Return the coefficient of determination, NaN for values that do not vary."""
-    spread = float(np.sum((values - values.mean()) ** 2))
-    return 1.0 - float(np.sum((values - model) ** 2)) / spread if spread > 0.0 else float("nan")
-
-
 _LEAST_GAIN = 1e-6  # of a criterion: below it rounding decides
 _LEAST_FREEDOM = 3
 _DEPENDENT = 1e-9  # of the triangle of a QR factorisation: a term that the others make up

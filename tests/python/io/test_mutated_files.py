@@ -21,7 +21,7 @@ from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io.point_table import read_conditions
 from mgdd.maps import CalibrationMap, read_map, write_map
 from mgdd.throttle import PseudoWiener
-from sample_files import CONDITIONS, SAMPLES, SLOW, sample_file
+from sample_files import CONDITIONS, SAMPLES, sample_file
 
 FEW = 250
 
@@ -181,6 +181,6 @@ def survey_any(name: str, folder: Path, count: int, first_seed: int) -> Counter[
 
 @pytest.mark.filterwarnings("ignore:.*not readable and left out")
 @pytest.mark.filterwarnings("ignore:.*does not name the axis")
-@pytest.mark.parametrize("name", [name for name in SAMPLES if name not in SLOW])
+@pytest.mark.parametrize("name", SAMPLES)
 def test_a_mutant_of_any_file_is_refused_with_an_error_of_mgdd(name: str, tmp_path: Path) -> None:
     assert survey_any(name, tmp_path, 40, 0)["refused"] > 0

@@ -19,10 +19,6 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.identify import OdeModel, load_throttle_model
 from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
-from mgdd.loop import SurrogatePlant
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.fit import random_step_records
-from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate_throttle
 
 TIME = 1e-3 * np.arange(300)
@@ -182,35 +178,6 @@ def test_an_ode_model_comes_back_with_its_functions() -> None:
     xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
     with pytest.raises(ParameterError, match="output = first_states: text was written with second; give that function"):
         OdeModel.from_toml(model.to_toml(), derivative=lag)
-
-
-@pytest.fixture(scope="module")
-def surrogate() -> EngineSurrogate:
-    return fit_surrogate(random_step_records(1500))
-
-
-def test_a_surrogate_predicts_and_runs_bit_for_bit_after_a_file(surrogate: EngineSurrogate) -> None:
-    again = EngineSurrogate.from_toml(surrogate.to_toml())
-    assert again.to_toml() == surrogate.to_toml()
-    grid = np.linspace(-8.0, 12.0, 41)
-    one, two = surrogate.predict(grid), again.predict(grid)
-    assert one.equals(two)
-    assert one.attrs == two.attrs
-    assert again.quality().equals(surrogate.quality())
-    assert again.source == surrogate.source
-    assert again.signals["nox_ppm"].sensor == surrogate.signals["nox_ppm"].sensor
-    first, then = (SurrogatePlant(model, seed=3) for model in (surrogate, again))
-    assert [first.step(-4.0) for _ in range(150)] == [then.step(-4.0) for _ in range(150)]
-
-
-def test_a_surrogate_file_is_checked(surrogate: EngineSurrogate) -> None:
-    text = surrogate.to_toml()
-    with pytest.raises(DataError, match=r"\[signals\] names .*: each needs its table"):
-        EngineSurrogate.from_toml(text.replace("[signal_imep_bar]", "[signal_work]"))
-    at = text.index("lower = { value = [") + len("lower = { value = [")
-    short = text[:at] + text[text.index(",", at) + 1 :]
-    with pytest.raises(DataError, match=r"mine: \[support\] lower: has shape \(3,\): must be \(4,\)"):
-        EngineSurrogate.from_toml(short, origin="mine")
 
 
 LAG = ParameterFile(

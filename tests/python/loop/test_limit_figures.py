@@ -11,21 +11,12 @@ from tests.python.support.stepped import stepped
 
 from mgdd.engine import OperatingPoint
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.loop import (
-    LoopCriteria,
-    Measurement,
-    SurrogatePlant,
-    VirtualEngine,
-    VirtualThrottle,
-    monte_carlo,
-    run_seeker,
-)
+from mgdd.loop import LoopCriteria, Measurement, VirtualEngine, VirtualThrottle, monte_carlo, run_seeker
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.fit import random_step_records
+from mgdd_studies.measured_engine import SurrogatePlant, fit_surrogate, random_step_records
 
 SPACE = {"start": -20.0, "bounds": (-30.0, 10.0)}
 SEEDS = range(20)

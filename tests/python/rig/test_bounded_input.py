@@ -20,14 +20,12 @@ from mgdd.io.files import decoded, parsed
 from mgdd.results.units import attribute_units
 from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.dbc import DbcFile
-from sample_files import SAMPLES, SLOW, sample_file
+from sample_files import SAMPLES, sample_file
 
 LONG = 500_000
 LETTERS, DIGITS = "n" * LONG, "7" * LONG
 MESSAGE, MEMORY = 4200, 100e6
-NAMES = [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in SAMPLES]
 TEXTS = [name for name in SAMPLES if SAMPLES[name].ending in ("csv", "json", "toml", "dcm", "cdfx", "dbc")]
-FEW_TEXTS = [name for name in TEXTS if name not in SLOW]
 # What reaches `ParameterFile.read` before anything of its own.
 ALIKE = [name for name in SAMPLES if re.search(r"^identify|^throttle|^surrogate|throttle$", name)]
 # Words and numbers of a file that are swelled in the quick tests, spread over it.
@@ -99,7 +97,7 @@ def test_every_public_reader_is_in_the_table() -> None:
     assert len(listed) >= 25
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SAMPLES)
 def test_the_good_file_is_read(name: str, tmp_path: Path) -> None:
     assert SAMPLES[name].read(sample_file(name, tmp_path)) is not None
 
@@ -167,7 +165,7 @@ FORMS = {
 }
 
 
-@pytest.mark.parametrize("name", FEW_TEXTS)
+@pytest.mark.parametrize("name", TEXTS)
 @pytest.mark.parametrize("form", FORMS)
 def test_a_word_of_any_length_and_a_number_of_any_size(name: str, form: str, tmp_path: Path) -> None:
     said = swell(name, tmp_path, *FORMS[form], most=FEW)

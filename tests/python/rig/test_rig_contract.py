@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, RigError
-from mgdd.loop import Measurement, Plant, SurrogatePlant, VirtualEngine, VirtualThrottle
+from mgdd.loop import Measurement, Plant, VirtualEngine, VirtualThrottle
 from mgdd.rig import CanRig, RecordingRig, ReplayRig, SimulatedRig
 from mgdd.rig.base import Rig
 from mgdd.rig.exchange import RigRecord
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.fit import random_step_records
-from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant, fit_surrogate, random_step_records
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")

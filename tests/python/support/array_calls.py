@@ -30,7 +30,6 @@ from mgdd.rig.exchange import RigRecord, flat
 from mgdd.rig.realtime import RingTransport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
-from mgdd.surrogate.fit import random_step_records
 from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm
 from realtime_loops import make_loop
@@ -49,7 +48,6 @@ WHOLE = np.random.default_rng(3).standard_normal(720)
 NOISE = np.random.default_rng(0).standard_normal(600)
 KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
 SOC = np.array([-8.0, -6.0, -4.0])
-RECORDS = surrogate.fit_surrogate(random_step_records(1500))
 SWEEP = np.linspace(-3.0, 3.0, 40)
 OPEN = np.array([10.0, 30.0, 60.0])
 CHAIN = throttle.DemandChain()
@@ -309,8 +307,5 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "signals.residual_tests": (lambda e, u: residual_tests(e, u).share_white, (NOISE, DUTY)),
     "signals.rmse": (rmse, (ANGLE, ANGLE + NOISE)),
     "signals.vaf_percent": (vaf_percent, (ANGLE, ANGLE + NOISE)),
-    "surrogate.EngineSurrogate.predict": (
-        lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
-    ),
     "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
 }  # fmt: skip

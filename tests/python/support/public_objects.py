@@ -82,8 +82,6 @@ def public_objects() -> dict[str, Any]:
         for name, cls in public_classes().items():
             if cls.__init__ is object.__init__ and cls.__subclasses__():  # made through those only
                 continue
-            if cls.__module__ == "mgdd.loop.surrogate_plant":  # its example fits a surrogate first
-                continue
             thing = None if inspect.isabstract(cls) else _by_arguments(cls)
             runs = hasattr(cls, "state") or hasattr(cls, "measure")
             if thing is None and runs and not hasattr(cls, "__enter__") and ".rig.can" not in name:

@@ -32,9 +32,7 @@ from mgdd.rig import (  # fmt: skip
 )
 from mgdd.rig.can.dbc import DbcFile
 from mgdd.rig.exchange import RigRecord  # fmt: skip
-from mgdd.surrogate import ResponseModel, fit_response, fit_surrogate
-from mgdd.surrogate.fit import random_step_records
-from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd.surrogate import ResponseModel, fit_response
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair
 from recorded_rig import write as write_record
 from user_buses import FOREIGN_MAP, write_foreign
@@ -130,11 +128,6 @@ def _dcm(path: Path) -> None:
 
 
 @cache
-def _surrogate() -> str:
-    return fit_surrogate(random_step_records(1100)).to_toml()
-
-
-@cache
 def _response() -> str:
     plan = design_points({"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0)}, 24, method="lhs", seed=2)
     return fit_response(plan, 0.3 * plan["fuel_mg"].values + 1e-3 * plan["speed_rpm"].values).model.to_toml()
@@ -184,16 +177,11 @@ SAMPLES: dict[str, Sample] = {
     "rig.export_record": Sample(_export, "rec", _record),
     "rig.RigRecord.read": Sample(RigRecord.read, "rec", _exchanges),
     "identify.FirstPrincipleModel": _of_toml(FirstPrincipleModel, lambda: FirstPrincipleModel().to_toml()),
-    "surrogate.EngineSurrogate": _of_toml(EngineSurrogate, _surrogate),
     "surrogate.ResponseModel": _of_toml(ResponseModel, _response),
     "throttle.DemandChain": _of_toml(DemandChain, lambda: DemandChain().to_toml()),
     "throttle.PseudoWiener": _of_toml(PseudoWiener, lambda: PseudoWiener("pw_r").to_toml()),
     "throttle.SensorPair": _of_toml(SensorPair, lambda: SensorPair().to_toml()),
 }
-
-
-# Whose good file takes seconds to make.
-SLOW = ("surrogate.EngineSurrogate",)
 
 
 def sample_file(name: str, folder: Path) -> Path:

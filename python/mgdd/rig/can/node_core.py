@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Protocol
 
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
-from mgdd.loop import Plant, SurrogatePlant, VirtualEngine, VirtualTestBed, VirtualThrottle
+from mgdd.loop import Plant, VirtualEngine, VirtualTestBed, VirtualThrottle
 from mgdd.rig.can.link import Receiver, Sender
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal
 from mgdd.rig.can.signal_map import SignalMap
@@ -98,7 +98,7 @@ class _Cyclic:
         self.sample_s: float | None = None
 
     def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...] | None:
-        if not isinstance(self._plant, VirtualEngine | VirtualTestBed | SurrogatePlant):
+        if not isinstance(self._plant, VirtualEngine | VirtualTestBed):
             return None  # to run a plant of somebody else may cost more than time
         ahead = _Cyclic(copy.deepcopy(self._plant))
         return tuple(ahead.sample(inputs).values)

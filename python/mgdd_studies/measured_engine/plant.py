@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mgdd._core.optimize import Limit
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.optimize import Limit
 from mgdd.optimize.optimum import limit_names_of
-from mgdd.results.describe import described
 from mgdd.surrogate.points import farthest_inside
-from mgdd.surrogate.signal_model import decay_of
-from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd_studies.measured_engine.signal_model import decay_of
+from mgdd_studies.measured_engine.surrogate import EngineSurrogate
 
 _LEVERAGE = "leverage_share"
 
@@ -63,9 +62,7 @@ class SurrogatePlant:
 
     Examples
     --------
-    >>> from mgdd.loop import SurrogatePlant
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.fit import random_step_records
+    >>> from mgdd_studies.measured_engine import SurrogatePlant, fit_surrogate, random_step_records
     >>> surrogate = fit_surrogate(random_step_records(1500))
     >>> plant = SurrogatePlant(surrogate, "imep_bar", limits=["mprr"], residuals=False)
     >>> reading = plant.step(-4.0)
@@ -245,19 +242,6 @@ class SurrogatePlant:
         self._row += 1
         self._left -= 1
         return row
-
-
-described(
-    SurrogatePlant,
-    rows=lambda plant: {
-        "signals": tuple(plant.surrogate.signals),
-        "inputs": plant.surrogate.inputs,
-        "cycles": plant.cycles,
-        "block_cycles": plant._block,
-        "residuals": plant._starts is not None,
-        "outside": plant._outside,
-    },
-)
 
 
 def _starts(residuals: NDArray[np.float64], block: int) -> NDArray[np.intp]:

@@ -10,11 +10,10 @@ import pytest
 from mgdd import datasets
 from mgdd.datasets.files import path
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.loop import SurrogatePlant, run_seeker
+from mgdd.loop import run_seeker
 from mgdd.optimize import GaussianProcessSeeking, Limit
 from mgdd.results.labels import check_labels
-from mgdd.surrogate import fit_surrogate
-from mgdd.surrogate.fit import random_step_records
+from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant, fit_surrogate, random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
 AT = {"doi_main_ms": 0.42, "doi_h2_ms": 2.9, "p2m_us": 1200.0}
@@ -487,3 +486,28 @@ def test_commands_of_the_records_hold_for_1_to_30_cycles() -> None:
     holds = np.diff(changes)  # two draws are never alike
     assert (holds.min(), holds.max()) == (1, 30)
     assert np.mean(holds) == pytest.approx(15.5, abs=4.0 * 8.66 / np.sqrt(holds.size))
+
+
+# --- its file ----------------------------------------------------------------------------------------------
+def test_a_surrogate_predicts_and_runs_bit_for_bit_after_a_file(known):
+    again = EngineSurrogate.from_toml(known.to_toml())
+    assert again.to_toml() == known.to_toml()
+    grid = np.linspace(-8.0, 12.0, 41)
+    one, two = known.predict(grid), again.predict(grid)
+    assert one.equals(two)
+    assert one.attrs == two.attrs
+    assert again.quality().equals(known.quality())
+    assert again.source == known.source
+    assert again.signals["nox_ppm"].sensor == known.signals["nox_ppm"].sensor
+    first, then = (SurrogatePlant(model, seed=3) for model in (known, again))
+    assert [first.step(-4.0) for _ in range(150)] == [then.step(-4.0) for _ in range(150)]
+
+
+def test_a_surrogate_file_is_checked(known):
+    text = known.to_toml()
+    with pytest.raises(DataError, match=r"\[signals\] names .*: each needs its table"):
+        EngineSurrogate.from_toml(text.replace("[signal_imep_bar]", "[signal_work]"))
+    at = text.index("lower = { value = [") + len("lower = { value = [")
+    short = text[:at] + text[text.index(",", at) + 1 :]
+    with pytest.raises(DataError, match=r"mine: \[support\] lower: has shape \(3,\): must be \(4,\)"):
+        EngineSurrogate.from_toml(short, origin="mine")

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
+from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
-from mgdd.surrogate.file import read_surrogate, surrogate_file
 from mgdd.surrogate.polynomial import PolynomialBasis, Support
-from mgdd.surrogate.signal_model import SignalModel
+from mgdd_studies.measured_engine.file import read_surrogate, surrogate_file
+from mgdd_studies.measured_engine.signal_model import SignalModel
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,9 +11,9 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.signals.even_grid import check_count
-from mgdd.surrogate.polynomial import PolynomialBasis, least_squares_of, r_squared, support_of
-from mgdd.surrogate.signal_model import SensorLag, SignalModel, find_sensor_lag, lagged
-from mgdd.surrogate.surrogate import STEERED, EngineSurrogate
+from mgdd.surrogate.polynomial import PolynomialBasis, support_of
+from mgdd_studies.measured_engine.signal_model import SensorLag, SignalModel, find_sensor_lag, lagged
+from mgdd_studies.measured_engine.surrogate import STEERED, EngineSurrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,8 +90,7 @@ def fit_surrogate(
 
     Examples
     --------
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.fit import random_step_records
+    >>> from mgdd_studies.measured_engine import fit_surrogate, random_step_records
     >>> surrogate = fit_surrogate(random_step_records(3000))
     >>> [signal.lag_cycles for signal in surrogate.signals.values()]
     [1, 1, 1, 3]
@@ -195,6 +194,17 @@ def _enough(use: NDArray[np.bool_], log: _Log, name: str) -> None:
             f"{name}: {np.count_nonzero(use)} usable cycles in a part of the records: {least} are needed; "
             "give more cycles, fewer inputs or another held_out"
         )
+
+
+def least_squares_of(terms: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the least-squares coefficients, by normal equations: the terms are standardised, so few digits go."""
+    return np.asarray(np.linalg.solve(terms.T @ terms, terms.T @ values), dtype=np.float64)
+
+
+def r_squared(values: NDArray[np.float64], model: NDArray[np.float64]) -> float:
+    """Return the coefficient of determination, NaN for values that do not vary."""
+    spread = float(np.sum((values - values.mean()) ** 2))
+    return 1.0 - float(np.sum((values - model) ** 2)) / spread if spread > 0.0 else float("nan")
 
 
 def _check_request(
