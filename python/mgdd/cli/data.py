@@ -16,13 +16,13 @@ from mgdd.cli.output import emit, warn, wrote
 from mgdd.datasets.files import FILES, LICENCES, place
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read, read_pressure
+from mgdd.io.angle_column import Reading
 from mgdd.io.any_table import TEXT, format_of, read_any_table
 from mgdd.io.bench_file import bench_record
 from mgdd.io.binary_files import write_netcdf, write_parquet
 from mgdd.io.channels import layout_of
 from mgdd.io.column_names import stated_unit, stem
 from mgdd.io.plain_csv import long_columns, write_long
-from mgdd.io.reading import Reading
 from mgdd.io.table import Table as FileTable
 from mgdd.report import Table
 from mgdd.results.labels import ANGLE

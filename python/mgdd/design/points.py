@@ -9,10 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.design.choice import (
+    best_of,
+    d_efficiency_percent,
+    d_optimal,
+    draw_inside,
+    extend_hypercube,
+    far_points,
+    least_distance,
+    sampler_of,
+)
 from mgdd.design.factors import Factors, factors_of
-from mgdd.design.optimal import d_efficiency_percent, d_optimal
 from mgdd.design.region import FeasibleRegion, inside_of
-from mgdd.design.space_filling import best_of, draw_inside, extend_hypercube, far_points, least_distance, sampler_of
 from mgdd.errors import DataError, ParameterError, argument
 from mgdd.surrogate.polynomial import MODELS, PolynomialBasis
 

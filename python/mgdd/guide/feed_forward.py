@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mgdd import _core
-from mgdd.engine.conditions import change_between, numbers_of
 from mgdd.errors import ParameterError
 from mgdd.guide.guided import TOLD, Column, Guided
 from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.seeker import Seeker, rebuilt
+from mgdd.presets.meant import change_between, numbers_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.engine.conditions import numbers_of
 from mgdd.errors import DataError, ParameterError, argument
 from mgdd.maps.calibration_map import CalibrationMap, map_of
+from mgdd.presets.meant import numbers_of
 from mgdd.results.describe import described
 
 if TYPE_CHECKING:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, argument
+from mgdd.io.angle_column import Reading
 from mgdd.io.any_table import open_table
 from mgdd.io.channels import Channel, Layout, columns_shown, kept_channels, layout_of
 from mgdd.io.column_names import TIME_UNITS
 from mgdd.io.pressure import CYCLE, cycle_count, record_attrs
 from mgdd.io.pressure_checks import check_magnitude, to_bar
 from mgdd.io.pressure_file import Pressure, Record, pressure_of, record_of
-from mgdd.io.reading import Reading
 from mgdd.io.table import Table
 from mgdd.results.labels import ANGLE, labelled_dataset
 

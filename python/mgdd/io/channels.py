@@ -11,11 +11,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, argument, did_you_mean
-from mgdd.io.angle_column import Angle, angle_of, headings
+from mgdd.io.angle_column import Angle, Reading, angle_of, headings
 from mgdd.io.column_names import TIME_UNITS, Heading, last_number, spelled_unit, stated_unit, stem, without_brackets
 from mgdd.io.pressure import CYCLE
 from mgdd.io.pressure_file import choose_pressure, odd_shape
-from mgdd.io.reading import Reading
 from mgdd.io.table import Table
 from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.results.units import attribute_units

@@ -13,14 +13,13 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.angle_column import angle_of, headings
+from mgdd.io.angle_column import Reading, angle_of, headings
 from mgdd.io.any_table import TEXT, format_of
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.io.cycles import SAME_ANGLE, several_cycles
 from mgdd.io.files import decoded, existing_file
 from mgdd.io.pressure import CYCLE, cycles_dataset, read_pressure
 from mgdd.io.pressure_file import Record, choose_pressure, cycles_of
-from mgdd.io.reading import Reading
 from mgdd.io.row_text import Rows
 from mgdd.io.table import TextTable, check_text_options, require_width, text_table
 

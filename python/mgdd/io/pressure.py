@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, taken
+from mgdd.io.angle_column import Reading
 from mgdd.io.any_table import open_table
 from mgdd.io.column_names import TIME_UNITS, Heading, heading
 from mgdd.io.pressure_checks import PRESSURE_UNITS, pair, to_bar
 from mgdd.io.pressure_file import checked, cycles_of, odd_shape
-from mgdd.io.reading import Reading
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:

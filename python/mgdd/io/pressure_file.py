@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mgdd.errors import DataError, argument
-from mgdd.io.angle_column import Angle, angle_of, at_the_speed_of_the_record, headings
+from mgdd.io.angle_column import Angle, Reading, angle_of, at_the_speed_of_the_record, headings
 from mgdd.io.column_names import Heading
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.io.cycles import Cycles, arranged
@@ -22,7 +22,6 @@ from mgdd.io.pressure_checks import (
     level_warning,
     steep_warning,
 )
-from mgdd.io.reading import Reading
 from mgdd.io.table import Place, Table
 from mgdd.io.wrong_channel import no_pressure
 

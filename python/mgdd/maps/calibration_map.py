@@ -10,7 +10,6 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._arguments import shown
-from mgdd.engine.conditions import numbers_of
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.maps.cells import (
     MapPlace,
@@ -22,6 +21,7 @@ from mgdd.maps.cells import (
     further_columns,
 )
 from mgdd.maps.forms import MapForms
+from mgdd.presets.meant import numbers_of
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.labels import Label
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -11,13 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, Error, ParameterError, ShapeError, argument
-from mgdd.io.files import write_whole_text
+from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.optimize.inputs import inputs_of, named_values, unit_of_input
 from mgdd.optimize.map_driver import MapDriver
 from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.process_seeking import surface_of
-from mgdd.optimize.seeker import encoded, read_saved
+from mgdd.optimize.seeker import made_of_saved, write_saved
 from mgdd.results.labels import labelled_dataset, named_label
 
 if TYPE_CHECKING:
@@ -327,20 +325,12 @@ class MapSeeking(_core.optimize.MapSeeking):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write settings and state as JSON; `load` goes on from there bit for bit."""
-        content = {"format": 1, "kind": "MapSeeking", "mgdd_version": _core.__version__,
-                   "settings": encoded(self.settings), "state": encoded(self.state)}  # fmt: skip
-        write_whole_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+        write_saved(path, "MapSeeking", self.settings, self.state)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read a search back that `save` wrote; DataError for any other file."""
-        kind, settings, state = read_saved(path)
-        if kind != "MapSeeking":
-            raise DataError(f"{os.fspath(path)}: holds a {kind}, not a MapSeeking")
-        try:
-            made: Self = _remade(cls, settings, state)
-        except (Error, TypeError, KeyError) as error:
-            raise DataError(f"{os.fspath(path)}: settings and state do not make a MapSeeking: {error}") from error
+        made: Self = made_of_saved(path, {"MapSeeking": cls}, _remade)
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:

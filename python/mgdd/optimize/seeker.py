@@ -190,14 +190,7 @@ class Seeker(SeekerFindings):
         OSError
             The file cannot be written.
         """
-        content = {
-            "format": _FORMAT,
-            "kind": self.kind,
-            "mgdd_version": _core.__version__,
-            "settings": encoded(self.settings),
-            "state": encoded(self.state),
-        }
-        write_whole_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+        write_saved(path, self.kind, self.settings, self.state)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -220,14 +213,8 @@ class Seeker(SeekerFindings):
         OSError
             The file cannot be read.
         """
-        kind, settings, state = read_saved(path)
         classes = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
-        if kind not in classes:
-            raise DataError(hinted(f"{Path(path)}: holds a {kind}, not a {' or '.join(classes)}", kind, classes))
-        try:
-            seeker: Self = rebuilt(classes[kind], settings, state, None)
-        except (Error, TypeError, KeyError) as error:
-            raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
+        seeker: Self = made_of_saved(path, classes, rebuilt)
         return seeker
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -245,8 +232,30 @@ class Seeker(SeekerFindings):
         return as_html(type(self).__name__, rows_of({**now, **self.settings}))
 
 
-def read_saved(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """Read kind, settings and state of a file that `Seeker.save` wrote; DataError for any other file."""
+def write_saved(path: str | os.PathLike[str], kind: str, settings: Mapping[str, Any], state: Any) -> None:
+    """Write kind, settings and state of a search as JSON."""
+    content = {
+        "format": _FORMAT,
+        "kind": kind,
+        "mgdd_version": _core.__version__,
+        "settings": encoded(settings),
+        "state": encoded(state),
+    }
+    write_whole_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def made_of_saved(path: str | os.PathLike[str], classes: Mapping[str, Any], make: Callable[..., Any]) -> Any:
+    """Make the search of a file, of one of the classes by kind; DataError for any other file."""
+    kind, settings, state = _read_saved(path)
+    if kind not in classes:
+        raise DataError(hinted(f"{Path(path)}: holds a {kind}, not a {' or '.join(classes)}", kind, classes))
+    try:
+        return make(classes[kind], settings, state)
+    except (Error, TypeError, KeyError) as error:
+        raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
+
+
+def _read_saved(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     file = Path(path)
     try:
         content = parsed(read_plain_text(file, only_utf8=True), "content", "JSON", _decode)
@@ -262,7 +271,9 @@ def read_saved(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[
     return kind, settings, state
 
 
-def rebuilt(cls: type[Any], settings: dict[str, Any], state: dict[str, Any], history: dict[str, Any] | None) -> Any:
+def rebuilt(
+    cls: type[Any], settings: dict[str, Any], state: dict[str, Any], history: dict[str, Any] | None = None
+) -> Any:
     """Make a seeker of its settings, state and, if given, columns of history."""
     with warnings.catch_warnings():  # advice on these settings was given when they were chosen
         warnings.simplefilter("ignore", UserWarning)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,6 @@ from mgdd.signals.model import columns_of
 
 MOST_FACTORS = 6  # of a hull: its facets grow beyond all memory with more
 EDGE = 1e-9  # of a range: a point so far outside of a boundary lies on it
-_HALVINGS = 40  # of the way to a boundary
 _CHUNK = 1 << 22  # facets times points that are computed at once
 _FLAT = 1e-9  # thickness of points, in their ranges, below which they have no hull
 
@@ -93,14 +92,3 @@ def hull_of(points: NDArray[np.float64], names: Sequence[str]) -> PointHull:
     equations = ConvexHull(scaled).equations
     equations = equations[np.unique(equations.round(9), axis=0, return_index=True)[1]]  # facets are cut into simplices
     return PointHull(lower=lower, span=span, normals=equations[:, :-1], offsets=equations[:, -1])
-
-
-def farthest_inside(
-    inside: NDArray[np.float64], outside: NDArray[np.float64], is_inside: Callable[[NDArray[np.float64]], bool]
-) -> NDArray[np.float64]:
-    """Find how far one can go from a point inside towards one outside; both of shape (m,)."""
-    least, most = 0.0, 1.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (least + most)
-        least, most = (middle, most) if is_inside(inside + middle * (outside - inside)) else (least, middle)
-    return inside + least * (outside - inside)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,11 @@ from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import limit_names_of
-from mgdd.surrogate.points import farthest_inside
 from mgdd_studies.measured_engine.signal_model import decay_of
 from mgdd_studies.measured_engine.surrogate import EngineSurrogate
 
 _LEVERAGE = "leverage_share"
+_HALVINGS = 40  # of the way to a boundary
 
 
 class SurrogatePlant:
@@ -252,3 +252,14 @@ def _starts(residuals: NDArray[np.float64], block: int) -> NDArray[np.intp]:
     if starts.size == 0:
         raise DataError(f"no {block} cycles in a row have all residuals: take a smaller block_cycles")
     return starts
+
+
+def farthest_inside(
+    inside: NDArray[np.float64], outside: NDArray[np.float64], is_inside: Callable[[NDArray[np.float64]], bool]
+) -> NDArray[np.float64]:
+    """Find how far one can go from a point inside towards one outside; both of shape (m,)."""
+    least, most = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (least + most)
+        least, most = (middle, most) if is_inside(inside + middle * (outside - inside)) else (least, middle)
+    return inside + least * (outside - inside)

@@ -143,8 +143,8 @@ def test_choices_that_are_documented_are_those_that_are_checked() -> None:
     from mgdd.design.points import METHODS
     from mgdd.identify.throttle.excitation import EXCITATIONS
     from mgdd.identify.throttle.fits import CHOICES
+    from mgdd.io.angle_column import ANGLE_UNITS
     from mgdd.io.pressure_checks import PRESSURE_UNITS
-    from mgdd.io.reading import ANGLE_UNITS
     from mgdd.surrogate.polynomial import MODELS
     from mgdd.surrogate.response_fit import KINDS, SELECTIONS
 

@@ -13,8 +13,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from scipy.stats import qmc
 
 from mgdd.design import FeasibleRegion, design_points
-from mgdd.design.optimal import d_optimal
-from mgdd.design.space_filling import least_distance
+from mgdd.design.choice import d_optimal, least_distance
 from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import Limit
