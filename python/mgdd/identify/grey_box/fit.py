@@ -190,7 +190,8 @@ def fit_model(
     search.check(np.array(started))
 
     def one(start: Mapping[str, float]) -> FitReport:
-        return search.one(start if shooting_samples is None else shoot(search, start, shooting_samples))
+        near = start if shooting_samples is None else shoot(search, start, shooting_samples)
+        return search.solve(list(near.values()))
 
     reports: list[FitReport] = []
     stop = keep_finished(one, starts, reports)

@@ -11,7 +11,6 @@ import numpy as np
 
 from mgdd.errors import ParameterError
 from mgdd.identify.grey_box.fit import GreyBoxFit
-from mgdd.optimize import least_squares
 from mgdd.results import Fit
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import Result
@@ -201,28 +200,10 @@ def _crossing(
 
 def _held(search: Search, values: Vector, i: int, at: float) -> tuple[float, Vector] | None:
     """Fit all but one parameter; return half the sum of squares, and all values."""
-    unknowns, others = search.unknowns, [j for j in range(values.size) if j != i]
-
-    def whole(part: Vector) -> Vector:
-        x = values.copy()
-        x[others], x[i] = part, at
-        return x
-
-    if not others:
-        evaluated = search.residual(whole(values[others]))
-        return None if evaluated is None else (0.5 * float(evaluated[0] @ evaluated[0]), whole(values[others]))
-
-    def residual(part: Vector) -> tuple[Vector, Vector] | None:
-        evaluated = search.residual(whole(part))
-        return None if evaluated is None else (evaluated[0], evaluated[1][:, others])
-
-    report = least_squares(
-        residual,
-        values[others],
-        names=[unknowns.names[j] for j in others],
-        bounds=(unknowns.lower[others], unknowns.upper[others]),
-        log_scaled=np.array(unknowns.logs, dtype=bool)[others],
-        max_iterations=search.options.max_iterations,
-        cost_tolerance=search.options.tolerance,
-    )
-    return (float(report.cost), whole(report.values)) if math.isfinite(report.cost) else None
+    x = values.copy()
+    x[i] = at
+    if x.size == 1:
+        evaluated = search.residual(x)
+        return None if evaluated is None else (0.5 * float(evaluated[0] @ evaluated[0]), x)
+    report = search.solve(x, held=i)
+    return (float(report.cost), np.insert(report.values, i, at)) if math.isfinite(report.cost) else None

@@ -61,25 +61,41 @@ class Search:
     unknowns: Unknowns
     options: Resolved
 
-    def one(self, start: Mapping[str, float]) -> FitReport:
-        """Search from a start."""
-        return self.solve(list(start.values()), iterations=self.options.max_iterations)
-
-    def solve(self, start: Sequence[float] | Vector, *, iterations: int) -> FitReport:
-        """Search from a start on whole records."""
-        unknowns, outputs = self.unknowns, [output for record in self.records for output in record.outputs]
-        several = len(self.model.output_names) > 1
+    def solve(
+        self,
+        start: Sequence[float] | Vector,
+        *,
+        ties: Ties | None = None,
+        held: int | None = None,
+        iterations: int | None = None,
+        tolerance: float | None = None,
+    ) -> FitReport:
+        """Search from a start: on whole records, or on tied stretches whose later starts follow; one may be held."""
+        unknowns, x = self.unknowns, np.array(start, dtype=np.float64)
+        outputs = [output for record in self.records for output in record.outputs]
+        free, more = [j for j in range(x.size) if j != held], x.size - len(unknowns.names)
         data = [output.of(output.values) for output in outputs]
+        if len(self.model.output_names) > 1:
+            data = [each - each.mean() for each in data]
+
+        def residual(part: Vector) -> tuple[Vector, Vector] | None:
+            at = x.copy()
+            at[free] = part
+            evaluated = self.residual(at, ties)
+            return None if evaluated is None else (evaluated[0], evaluated[1][:, free])
+
+        names = (*unknowns.names, *(f"stretch_{i}" for i in range(more)))
+        lower, upper = np.r_[unknowns.lower, [-np.inf] * more], np.r_[unknowns.upper, [np.inf] * more]
         return least_squares(
-            self.residual,
-            start,
-            names=unknowns.names,
-            bounds=(unknowns.lower, unknowns.upper),
-            log_scaled=np.array(unknowns.logs, dtype=bool),
-            data=np.concatenate([each - each.mean() for each in data] if several else data),
-            records=[output.kept.size for output in outputs],
-            max_iterations=iterations,
-            cost_tolerance=self.options.tolerance,
+            residual,
+            x[free],
+            names=[names[j] for j in free],
+            bounds=(lower[free], upper[free]),
+            log_scaled=np.array([*unknowns.logs, *[False] * more], dtype=bool)[free],
+            data=None if ties else np.concatenate(data),
+            records=None if ties else [output.kept.size for output in outputs],
+            max_iterations=iterations or self.options.max_iterations,
+            cost_tolerance=tolerance or self.options.tolerance,
         )
 
     def check(self, x: Vector) -> None:
@@ -245,7 +261,8 @@ def shoot(search: Search, start: Mapping[str, float], length: int) -> dict[str, 
         states = x[n:].reshape(-1, n_states)
         scale = states.std(axis=0)
         scale = np.where(scale > 0.0, scale, np.maximum(np.abs(states).max(axis=0), 1.0))
-        x = _search(search, x, Ties(length, price * spread * np.sqrt(length) / scale))
+        ties = Ties(length, price * spread * np.sqrt(length) / scale)
+        x = search.solve(x, ties=ties, iterations=_TRIALS, tolerance=1e-4).values
     found = np.clip(x[:n], search.unknowns.lower, search.unknowns.upper)
     return dict(zip(start, found.tolist(), strict=True))
 
@@ -261,18 +278,3 @@ def _later_starts(search: Search, k: int, length: int) -> Vector:
             seen = np.flatnonzero(np.isfinite(output.values))
             states[:, i] = np.interp(at, seen, output.values[seen])
     return states
-
-
-def _search(search: Search, x: Vector, ties: Ties) -> Vector:
-    unknowns, n = search.unknowns, len(search.unknowns.names)
-    more = x.size - n
-    report = least_squares(
-        lambda at: search.residual(at, ties),
-        x,
-        names=[*unknowns.names, *(f"stretch_{i}" for i in range(more))],
-        bounds=(np.r_[unknowns.lower, np.full(more, -np.inf)], np.r_[unknowns.upper, np.full(more, np.inf)]),
-        log_scaled=np.r_[np.array(unknowns.logs, dtype=bool), np.zeros(more, dtype=bool)],
-        max_iterations=_TRIALS,
-        cost_tolerance=1e-4,
-    )
-    return report.values
