@@ -259,11 +259,11 @@ def test_a_damaged_file_is_named_and_the_whole_one_still_reads(
     assert read_map(file).name == "soc_cad"
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=225, deadline=None)
 @given(data=st.data())
 def test_a_file_cut_anywhere_is_refused(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("cut")
-    file = folder / f"map.{data.draw(st.sampled_from(['dcm', 'nc']))}"
+    file = folder / f"map.{data.draw(st.sampled_from(['dcm', 'nc', 'cdfx']))}"
     write_map(whole(curve()), file)
     raw = file.read_bytes().rstrip()
     file.write_bytes(raw[: data.draw(st.integers(0, len(raw) - 1))])

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from map_cases import FUEL, SPEED, timing_table
-from mgdd.errors import DataError, Error, ParameterError
+from mgdd.errors import DataError, ParameterError
 from mgdd.maps import CalibrationMap, read_dcm, read_map, smooth_map, write_map
 
 DATA = Path(__file__).parents[2] / "data"
@@ -527,14 +527,3 @@ def test_a_damaged_cdfx_file_is_named(old: str, new: str, said: str, tmp_path: P
     with pytest.raises(DataError, match=said):
         read(text.replace(old, new, 1), tmp_path, "map.cdfx")
     assert read(text, tmp_path, "map.cdfx").name == "soc_cad"
-
-
-@settings(max_examples=150, deadline=None)
-@given(data=st.data())
-def test_a_cdfx_file_cut_anywhere_is_refused(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
-    file = tmp_path_factory.mktemp("cut") / "map.cdfx"
-    write_map(CalibrationMap(AXES, VALUES, name="soc_cad"), file)
-    raw = file.read_bytes().rstrip()
-    file.write_bytes(raw[: data.draw(st.integers(0, len(raw) - 1))])
-    with pytest.raises(Error):
-        read_map(file)

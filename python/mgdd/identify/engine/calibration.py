@@ -11,7 +11,7 @@ from mgdd import _core
 from mgdd.errors import argument
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.profile import WallHeatProfile, wall_heat_profile
-from mgdd.identify.engine.records import CylinderFit, figures_of
+from mgdd.identify.engine.records import CylinderFit, figures_of, rmse_of
 from mgdd.identify.engine.tdc import TdcEstimate, estimate_tdc
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of
 
@@ -68,13 +68,9 @@ def compare_laws(
     return fits
 
 
-def _rmse(law: CylinderFit) -> float:
-    return law.report.rmse if law.report.rmse == law.report.rmse else math.inf
-
-
 def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
     """Doubt a fit where the best of the compared laws meets the traces much better; an empty list where none does."""
-    best = min(laws, key=_rmse)
+    best = min(laws, key=rmse_of)
     if not best.report.rmse < _MUCH_BETTER * fit.report.rmse:
         return []
     rmse, fit_rmse = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
@@ -188,7 +184,7 @@ class Calibration:
         form = "  {:28} {:>9} {:>17} {:>10} {:>8}"
         head = ("law", "RMSE [%]", "closed IMEP [%]", "wall heat", "doubts")
         lines += ["", "every burn law on the same traces, the nearest first:", form.format(*head)]
-        for law in sorted(self.laws, key=_rmse):
+        for law in sorted(self.laws, key=rmse_of):
             off = [load.imep_closed_error_percent for load in law.loads]
             between = f"{min(off):+.1f} to {max(off):+.1f}"
             scale = f"{law.model.wall_heat_scale:.2f}"
