@@ -212,6 +212,9 @@ def test_several_records_share_parameters_and_each_has_its_start():
     found = fit_model(GUESS, records, **settings)
     assert found.report.names[3:5] == ("state_0_of_0", "state_1_of_0")
     assert np.all(np.abs(found.report.values - [*TRUE, *np.ravel(starts)]) < 5 * found.report.stderr)
+    whole = np.concatenate([each["y"] for each in records])
+    left = np.linalg.norm(found.report.residual) / np.linalg.norm(whole - whole.mean())
+    assert found.report.nrmse_fit_percent == pytest.approx(100.0 * (1.0 - left), rel=1e-9)
     levels = [np.full(each["y"].size, 0.002) for each in records]
     known = fit_model(GUESS, records, sigma=levels, **settings)
     np.testing.assert_allclose(known.report.values, found.report.values, rtol=1e-6)
