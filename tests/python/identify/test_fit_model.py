@@ -220,20 +220,20 @@ def test_stretches_that_a_model_cannot_have_are_refused():
 
 
 # --- profiles ---------------------------------------------------------------------------------------------------
-def straight(_x, u, p):
-    return p[0] + p[1] * u[:, 0]
+def parabola(_x, u, p):
+    return p[0] + p[1] * u[:, 0] + p[2] * u[:, 0] ** 2
 
 
-def test_the_profile_of_a_line_is_the_interval_of_its_report():
+def test_the_profile_of_a_linear_model_is_the_interval_of_its_report():
     draw = np.random.default_rng(4)
     record = {"time_s": TIME, "u": INPUT, "y": 1.0 + 2.0 * INPUT + 0.3 * draw.standard_normal(300)}
-    found = fit_model(SimulatorModel(simulator=straight, parameters={"level": 0.0, "slope": 1.0}), record)
+    found = fit_model(SimulatorModel(simulator=parabola, parameters={"level": 0.0, "slope": 1.0, "bend": 0.0}), record)
     for level in (0.5, 0.95):
         for name, (low, high) in found.report.interval(level).items():
             profile = profile_likelihood(found, name, level=level)
             assert (profile.low, profile.high) == pytest.approx((low, high), rel=1e-6)
             assert profile.dataset["deviance"].min() == 0.0
-    with pytest.raises(ParameterError, match="name = 'gain': must be one of the estimated level, slope"):
+    with pytest.raises(ParameterError, match="name = 'gain': must be one of the estimated level, slope, bend"):
         profile_likelihood(found, "gain")
 
 
