@@ -12,7 +12,6 @@ import numpy as np
 from mgdd.guide import Curve, CurveSeeking, ModelOptimum
 from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
-from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus, new_figure
 from mgdd.results.labels import label_of, labelled_dataset
 from mgdd_studies import measured_engine_cases as measured
@@ -21,6 +20,7 @@ from mgdd_studies.figures import band, legend_outside, names_of
 from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant, fit_surrogate
 from mgdd_studies.statistics import (
     OF_SEEDS,
+    approach_gain,
     band_variables,
     first_within,
     sd_of,

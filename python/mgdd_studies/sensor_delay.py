@@ -13,13 +13,12 @@ from mgdd.engine import Performance
 from mgdd.loop import LoopCriteria, SensorDynamics, VirtualEngine, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking
 from mgdd.optimize.optimum import Optimum
-from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.units import unit_attributes
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd_studies.curves import convergence
-from mgdd_studies.statistics import OVER_SEEDS, band_variables, estimates, loops, rms, with_interval
+from mgdd_studies.statistics import OVER_SEEDS, approach_gain, band_variables, estimates, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "OF_SEEDS", "OVER_SEEDS", "band_variables", "estimates", "first_within", "loops", "mean_interval",
+    "OF_SEEDS", "OVER_SEEDS", "approach_gain", "band_variables", "estimates", "first_within", "loops", "mean_interval",
     "median_interval", "quantile_of", "quantiles_of", "rms", "run_with_slope", "sd_of", "stays_within", "with_interval",
     "with_median_interval", "with_quantiles",
 ]  # fmt: skip
@@ -204,3 +204,8 @@ def run_with_slope(bench: VirtualEngine, seeker: Any, cycles: int) -> xr.Dataset
     mean = np.convolve(slope, np.full(period, 1.0 / period))[:cycles]
     attrs = unit_attributes("%/°CA", "estimated slope of the objective")
     return run.assign(gradient_per_cad=("cycle", mean, attrs))
+
+
+def approach_gain(curvature: float, time_constant_cycles: float, *, amplitude: float = 1.0) -> float:
+    """Give the gain by which extremum seeking nears an optimum of this curvature with this time constant [cycles]."""
+    return 2.0 / (amplitude * abs(curvature) * time_constant_cycles)

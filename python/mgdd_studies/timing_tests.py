@@ -13,11 +13,10 @@ from mgdd.engine import Performance
 from mgdd.loop import LoopCriteria, VirtualEngine
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit
 from mgdd.optimize.optimum import Optimum
-from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.statistics import loops, rms, run_with_slope, with_interval
+from mgdd_studies.statistics import approach_gain, loops, rms, run_with_slope, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -258,11 +258,6 @@ def _spsa(
     return out, scatter(c)
 
 
-def approach_gain(curvature: float, time_constant_cycles: float, *, amplitude: float = 1.0) -> float:
-    """Give the gain by which extremum seeking nears an optimum of this curvature with this time constant [cycles]."""
-    return 2.0 / (amplitude * abs(curvature) * time_constant_cycles)
-
-
 _METHODS = ("batch", "moving_average", "spsa")
 _MOST_INPUTS = 8
 _FLAT = 1e-6  # of the curvature along the inputs
