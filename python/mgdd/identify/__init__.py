@@ -2,7 +2,7 @@
 
 Engine: `fit_cylinder`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
 `validate_throttle` and the fits and excitations below them. Models of the
-user's own: `fit_model`. Every fit answers with a `mgdd.results.Fit`.
+user's own: `fit_model`, and `fit_ode` in one call. Every fit answers with a `mgdd.results.Fit`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from mgdd.identify.engine.profile import wall_heat_profile
 from mgdd.identify.engine.tdc import estimate_tdc
 from mgdd.identify.grey_box.fit import fit_model
 from mgdd.identify.grey_box.models import DiscreteModel, OdeModel, SimulatorModel
+from mgdd.identify.grey_box.ode import fit_ode
 from mgdd.identify.grey_box.profile import profile_likelihood
 from mgdd.identify.throttle.excitation import check_excitation, design_excitation
 from mgdd.identify.throttle.fits import load_throttle_model
@@ -24,8 +25,8 @@ from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
     "DiscreteModel", "ModelFamily", "OdeModel", "OnlineUpdate", "SimulatorModel", "best_timing", "check_excitation",
-    "design_excitation", "estimate_tdc", "fit_cylinder", "fit_model", "identify_throttle", "load_throttle_model",
-    "profile_likelihood", "validate_throttle", "wall_heat_profile",
+    "design_excitation", "estimate_tdc", "fit_cylinder", "fit_model", "fit_ode", "identify_throttle",
+    "load_throttle_model", "profile_likelihood", "validate_throttle", "wall_heat_profile",
 ]  # fmt: skip
 
 _furnish(__name__)

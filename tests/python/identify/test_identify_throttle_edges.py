@@ -155,6 +155,12 @@ def test_a_fit_far_below_its_noise_ceiling_is_doubted(p1: Throttle) -> None:
     good = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
     assert good.train.nrmse_fit_percent > 98.0
     assert "below_ceiling" not in {found.code for found in good.findings}
+    # Where the test log holds what the first did not, that one decides.
+    other = measured(p1.replace(coulomb_nm=1.25 * p1.coulomb_nm), swing())
+    tested = identify_throttle(log, "first_principle", test=other, options=FitOptions(n_starts=1))
+    said = [str(found) for found in tested.findings if found.code == "below_ceiling"]
+    assert len(said) == 1
+    assert f"meets the test log at {tested.test.nrmse_fit_percent:.1f} %" in said[0]
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -26,6 +26,7 @@ from mgdd.identify.throttle.whole_delay import (
     independent_samples,
     missed,
     names_of,
+    steps_of,
     whole_delay,
     with_delay,
 )
@@ -70,6 +71,7 @@ def fit_groups(
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=40, tolerance=1e-7)
     problem = groups_problem(log, fixed=fixed, stops_deg=stops_deg)
+    fine = steps_of(FINE, problem.step_s)
     hunt = Hunt(problem=problem, max_iterations=chosen.max_iterations, tolerance=chosen.tolerance)
     interrupted: Interrupted | None = None
     findings: list[Finding] = []
@@ -87,7 +89,7 @@ def fit_groups(
         n = independent_values(problem, report)
         weights = delay_weights(by_delay.rivals, search.values["delay_samples"], n)
         report = with_nuisances(
-            problem, search.values, report, substeps=FINE, share_known=SHARE in fixed_values, delays=weights
+            problem, search.values, report, substeps=fine, share_known=SHARE in fixed_values, delays=weights
         )
     except Interrupted as stop:
         if hunt.best is None:
@@ -100,7 +102,7 @@ def fit_groups(
         delay = search.values["delay_samples"]
         report = with_delay(report, delay, by_delay.rivals, independent_values(problem, report), delays)
     model = FirstPrincipleModel(
-        parameters=search.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=FINE, sample_s=problem.step_s
+        parameters=search.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=fine, sample_s=problem.step_s
     )
     run = free_run(model, log)
     train = quality_of([run])

@@ -91,9 +91,11 @@ def noise_of(angle: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(least**2) / (_LEAST_FOUR_FIFTHS * 6.0)))
 
 
-def below_ceiling(logs: Sequence[xr.Dataset], train: FitQuality | None) -> tuple[Finding, ...]:
-    """Report a fit that misses far more of its own logs than the noise of the angle."""
-    fit = None if train is None else train.nrmse_fit_percent
+def below_ceiling(
+    logs: Sequence[xr.Dataset], quality: FitQuality | None, name: str = "its own log"
+) -> tuple[Finding, ...]:
+    """Report a fit that misses far more of logs than the noise of their angle."""
+    fit = None if quality is None else quality.nrmse_fit_percent
     if fit is None:
         return ()
     angles = [log["angle_deg"].to_numpy() for log in logs]
@@ -102,7 +104,7 @@ def below_ceiling(logs: Sequence[xr.Dataset], train: FitQuality | None) -> tuple
     if ceiling - fit <= _MISSED_PERCENT:
         return ()
     text = (
-        f"the fit meets its own log at {fit:.1f} %, and the noise of the angle alone would leave {ceiling:.1f} %: the "
+        f"the fit meets {name} at {fit:.1f} %, and the noise of the angle alone would leave {ceiling:.1f} %: the "
         "plate does what the model does not have, and the intervals hold for the model only"
     )
     remedy = "compare with the other kinds of model, look at the residuals, and check the stops and the log"

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle_problem import shows_limp_home
 from mgdd.identify.throttle.fits import CHOICES, PSEUDO_WIENER, check_kind, fit_kind
-from mgdd.identify.throttle.free_run import as_log, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import as_log, below_ceiling, free_run, quality_of, source_of
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import moves_against, open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
@@ -193,6 +193,9 @@ def identify_throttle(
         stops_deg=(closed_deg, open_deg), options=options,
     )  # fmt: skip
     tested = None if test is None else quality_of([free_run(fit.model, test)])
+    beyond: tuple[Finding, ...] = ()
+    if test is not None and all(finding.code != "below_ceiling" for finding in fit.findings):
+        beyond = below_ceiling([test], tested, "the test log")
     prior = prior_of(fit.model)
     home = prior.limp_home_deg if estimated or limp_home is None else limp_home
     time, duty, angle = (log[name].to_numpy() for name in ("time_s", "duty", "angle_deg"))
@@ -205,7 +208,7 @@ def identify_throttle(
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
     against = moves_against(time, duty, angle, (closed_deg, open_deg))
-    findings = unique((*against, *of_fit, *_carried_over(fit.train, tested), *read, *stops, *questions))
+    findings = unique((*against, *of_fit, *_carried_over(fit.train, tested), *beyond, *read, *stops, *questions))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 

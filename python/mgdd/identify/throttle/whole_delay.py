@@ -19,7 +19,7 @@ from mgdd.identify.throttle.free_run import noise_of
 from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport
 
-# Steps per sample of the look at bristles, and of what is handed over.
+# Steps per sample of the look at bristles, and of what is handed over, at samples of 1 ms or more.
 BRISTLES, FINE = 4, 8
 # What a wrong time constant spoils at once: searched first, as the rest would make up for it.
 MOVING = ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")
@@ -28,6 +28,11 @@ WORTH = 0.99  # what explains less than a hundredth of the error is left out, ho
 # What a search has found absent begins here in the next, not where one begins that was never searched.
 _ABSENT = {"electrical_s": 1e-4, "stribeck_drop": 1e-3, "delay_samples": 1e-3, "half_gap_deg": 1e-3}
 FLOOR_DEG = 5e-3  # a 14-bit converter steps by as much: a residual below it is as good as any
+
+
+def steps_of(substeps: int, step_s: float) -> int:
+    """Return the steps per sample that are as long in shorter samples: never longer ones."""
+    return max(math.ceil(substeps * min(step_s / 1e-3, 1.0) - 1e-9), 1)
 
 
 @dataclass(kw_only=True)
@@ -47,7 +52,7 @@ class Hunt:
         start = {name: value or (_ABSENT.get(name, 0.0) if name in free else 0.0) for name, value in values.items()}
         try:
             search = self.problem.search(
-                start, free, substeps=substeps, tolerance=tolerance,
+                start, free, substeps=steps_of(substeps, self.problem.step_s), tolerance=tolerance,
                 max_iterations=min(iterations, self.max_iterations),
             )  # fmt: skip
         except Interrupted as stop:
