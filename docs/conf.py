@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import filecmp
+import importlib
 import io
 import json
 import re
 import shutil
+import textwrap
+import unicodedata
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpydoc.docscrape_sphinx
@@ -67,7 +71,6 @@ copy_notebooks()
 shutil.rmtree(HERE / "generated", ignore_errors=True)  # a page of a name that is gone would be an orphan
 
 # --- reference ----------------------------------------------------------------------------------------------
-autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings name type, shape and unit
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
@@ -77,6 +80,27 @@ nitpick_ignore_regex = [
     (r"py:.*", r"(?!mgdd(_studies)?\.).*"),  # other projects: no inventories without a network
     (r"py:.*", r"mgdd\._core.*"),  # documented where it is offered, in mgdd.<room>
 ]
+
+
+def names_of(module: str) -> list[str]:
+    """Give the public names of a module that are no modules themselves."""
+    room = importlib.import_module(module)
+    return [name for name in room.__all__ if name != "__version__" and not isinstance(getattr(room, name), ModuleType)]
+
+
+def summary_of(module: str, folder: str = "generated") -> str:
+    """Write the table of a module's names, each with a page of its own in ``folder``."""
+    names = "".join(f"   {name}\n" for name in API[module])
+    return f".. currentmodule:: {module}\n\n.. autosummary::\n   :toctree: {folder}\n\n{names}\n"
+
+
+SECTIONS = re.compile(r"^(?=## mgdd)", re.MULTILINE)
+_, *sections = SECTIONS.split((HERE / "api.md").read_text(encoding="utf-8"))
+API = {module: names_of(module) for module in (section.split()[1] for section in sections)}
+# Autosummary finds the pages to write in files, not in what `insert_generated` makes of them.
+(HERE / "_build").mkdir(exist_ok=True)
+(HERE / "_build" / "names.rst").write_text("".join(summary_of(each, "../generated") for each in API), encoding="utf-8")
+autosummary_generate = ["_build/names.rst"]
 
 # --- look ---------------------------------------------------------------------------------------------------
 html_theme = "pydata_sphinx_theme"
@@ -96,16 +120,69 @@ html_show_sourcelink = False
 html_search_scorer = str(HERE / "_static" / "search_scorer.js")
 
 
+KEYS = json.loads((HERE.parent / "tests" / "data" / "json_keys.json").read_text(encoding="utf-8"))
+
+
 def help_of(command: str) -> str:
-    """Print what a command says of itself, folded; the usage line repeats its options."""
+    """Print what a command says of itself and the keys of its JSON, folded; the usage line repeats its options."""
     with contextlib.redirect_stdout(io.StringIO()) as text, contextlib.suppress(SystemExit):
         main([*command.split(), "--help"])
     shown = text.getvalue().partition("\n\n")[2]
+    for call, keys in KEYS.items():
+        if f"{call} ".startswith(f"{command} "):
+            shown += f"\nkeys of mgdd {call} --json:\n{textwrap.fill(keys, 100)}\n"
     return f"<details><summary>mgdd {command} --help</summary>\n\n```text\n{shown}```\n\n</details>\n\n"
 
 
+ACCENTS = {'"': "\u0308", "'": "\u0301", "v": "\u030c"}
+
+
+def plain(text: str) -> str:
+    """Write the letters of BibTeX as Unicode, in one line."""
+    text = re.sub(r"\\(['\"v]) ?(\w)", lambda accent: accent[2] + ACCENTS[accent[1]], text.replace("\\AA", "Å"))
+    text = unicodedata.normalize("NFC", re.sub(r"[{}\\]", "", text).replace("--", "–"))
+    return " ".join(text.split())
+
+
+SHOWN = (
+    "journal",
+    "booktitle",
+    "series",
+    "school",
+    "publisher",
+    "howpublished",
+    "type",
+    "volume",
+    "number",
+    "pages",
+    "note",
+)
+
+
+def list_references() -> str:
+    """Write ``references.bib`` as paragraphs with the targets ``ref-KEY``, by author and year."""
+    text = (HERE.parent / "references.bib").read_text(encoding="utf-8")
+    paragraphs = {}
+    for key, body in re.findall(r"^@\w+\{(\w+),(.*?)^\}", text, re.MULTILINE | re.DOTALL):
+        fields = re.findall(r"^ +(\w+) *= \{(.*?)\},?$", body, re.MULTILINE | re.DOTALL)
+        entry = {name: plain(value) for name, value in fields}
+        if {"volume", "number"} <= entry.keys():
+            entry["volume"] += f"({entry.pop('number')})"
+        link = [f"<{entry['url']}>"] if "url" in entry else []
+        place = ", ".join([entry[name] for name in SHOWN if name in entry] + link)
+        author = entry["author"].replace(" and others", " et al.").replace(" and ", "; ")
+        author += f" ({entry['year']})" if "year" in entry else ""
+        order = unicodedata.normalize("NFD", author).lower() + key
+        paragraphs[order] = f"(ref-{key})=\n{author}: *{entry['title']}*. {place}.\n"
+    return "\n".join(paragraphs[order] for order in sorted(paragraphs))
+
+
 def insert_generated(_: Any, page: str, source: list[str]) -> None:
-    """Put into the pages what the package knows: the help below each command, the table of variables."""
+    """Put into the pages what the package knows: the help below each command, names, variables, sources."""
+    if page == "api":
+        head, *sections = SECTIONS.split(source[0])
+        made = [f"```{{eval-rst}}\n{summary_of(section.split()[1])}```" for section in sections]
+        source[0] = head + "".join(map(str.replace, sections, ["<!-- names -->"] * len(made), made))
     if page == "cli":
         head, *sections = re.split(r"^(?=## mgdd )", source[0], flags=re.MULTILINE)
         for section in sections:
@@ -116,6 +193,8 @@ def insert_generated(_: Any, page: str, source: list[str]) -> None:
     if page == "formats":
         rows = "".join(f"| `{name}` | {label.units} | {label.long_name} |\n" for name, label in VARIABLES.items())
         source[0] = source[0].replace("<!-- variables -->\n", f"| name | unit | meaning |\n| --- | --- | --- |\n{rows}")
+    if page == "bibliography":
+        source[0] = source[0].replace("<!-- references -->\n", list_references())
 
 
 def list_versions(app: Any, error: Exception | None) -> None:
@@ -136,12 +215,7 @@ def setup(app: Any) -> None:
 
 
 # The side bar of the API: its modules, and the names of the one that is open.
-html_context = {
-    "api": {
-        section.splitlines()[0]: re.findall(r"^   (\w+)$", section, re.MULTILINE)
-        for section in re.split(r"^## (?=mgdd)", (HERE / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
-    }
-}
+html_context = {"api": API}
 html_sidebars = {"api": ["api-nav.html"], "generated/*": ["api-nav.html"]}
 html_static_path = ["_static"]
 html_css_files = ["mgdd.css"]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from tables_of_control import throttle_baselines, throttle_faults
 from tables_of_guidance import ignition_plane, ignition_slopes, model_stages
-from tables_of_measured_traces import burn_laws, demo, fits, members, profile, timing, traces
+from tables_of_measured_traces import burn_laws, fits, members, profile, timing, traces
 from tables_of_model import (
     Rows,
     convergence,
@@ -42,7 +42,6 @@ from mgdd_studies.guide_cases import SpeedLoadPlane
 __all__ = [
     "burn_laws",
     "convergence",
-    "demo",
     "esc_cases",
     "esc_components",
     "esc_tests",
@@ -77,7 +76,7 @@ __all__ = [
 ]
 
 LABEL_COLUMNS = {
-    "woschni_units": 2, "burn_laws": 2, "esc_cases": 2, "seekers": 2, "ignition_plane": 2,
+    "woschni_units": 2, "esc_cases": 2, "seekers": 2, "ignition_plane": 2,
     "model_stages": 2, "guided_plane": 2,
 }  # fmt: skip
 

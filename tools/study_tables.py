@@ -50,12 +50,17 @@ def _between(name: str, digits: int) -> Callable[[Row], str]:
 def _median_and_p95(name: str, digits: int, unit: str = "") -> Callable[[Row], str]:
     def said(row: Row) -> str:
         ends = (row[f"{name}{unit}"], row[f"{name}_p95{unit}"])
-        return " / ".join("never" if end is None else _printed(end, digits) for end in ends)
+        median, p95 = ("never" if end is None else _printed(end, digits) for end in ends)
+        return f"{median} ({p95})"
 
     return said
 
 
-_ENGINE: tuple[Column, ...] = (("engine", _words("engine")), ("start [°CA aTDC]", _number("start_cad", 0)))
+def _engine(row: Row) -> str:
+    return str(row["engine"]).partition(",")[0]  # the page has its wall heat
+
+
+_ENGINE: tuple[Column, ...] = (("engine", _engine), ("start [°CA aTDC]", _number("start_cad", 0)))
 _PATH: tuple[Column, ...] = (
     ("stays within 1.5 °CA from cycle, median", _between("median_stays", 0)),
     ("90 % of the runs", _number("stays_90_percent", 0)),
@@ -83,7 +88,7 @@ def _is_of_noise(row: Row) -> bool:
 _VISITS = (0, 6, 8, 10, 12, 16, 24, 32, 64)  # that a page prints
 # The rows of a table where it has not all of them.
 _ROWS: Mapping[str, Callable[[Row], bool]] = {
-    "online-calibration": _is_of_noise,
+    "online-calibration": lambda row: row["sensor"].endswith("of noise"),
     "calibrated-guide": lambda row: row["tdc_error_cad"] == 0.0,
     "map-that-seeks": lambda row: row["visits"] == 24,
 }
@@ -117,7 +122,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             )),
         ),
         "refits": (
-            ("engine", _words("engine")),
+            ("engine", _engine),
             ("calibrated", _words("calibrated")),
             ("per run", _number("refits_per_run", 1)),
             ("error changed by those before cycle 10 [°CA]", _number("early_change_cad", 2)),
@@ -126,7 +131,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("threw back", lambda row: f"{row['thrown_back']} of {row['late_refits']}"),
         ),
         "load_step": (
-            ("engine", _words("engine")),
+            ("engine", _engine),
             ("form", _words("form")),
             ("calibrated", _words("calibrated")),
             ("guide off at the new point [°CA]", _number("guide_error_cad", 1)),
@@ -171,7 +176,6 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("loss per cycle [points]", _between("lost_percent", 3)),
             ("first 50 cycles at a point", _between("early_lost_percent", 3)),
             ("last 50", _between("late_lost_percent", 3)),
-            ("less than the plain seeker [%]", _between("saved_percent", 0)),
             ("less than with the rough model [%]", _between("less_than_rough_percent", 0)),
             ("cycles above a limit [%]", _between("above_percent", 1)),
         ),
@@ -229,13 +233,6 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("variation in 2 s of rest", _number("variation_rest", 1)),
             ("limit cycles", _number("limit_cycles", 0)),
         ),
-        "warm": (
-            ("preset", _words("preset")),
-            ("wrong", _words("wrong")),
-            ("model-guided", _words("controller")),
-            ("MSE sine 40 ± 10 deg [deg²]", _number("sine_mse_deg2", 5)),
-            ("MSE sine 10 ± 8 deg [deg²]", _number("crossing_mse_deg2", 5)),
-        ),
     },
 }  # fmt: skip
 
@@ -253,6 +250,8 @@ def tables(name: str, summary: Mapping[str, Any]) -> dict[str, list[str]]:
         out["errors"] = _errors(summary["rows"])
     elif name == "calibrated-guide":
         out["settings"] = _settings(summary["settings"])
+    elif name == "throttle-tracking":
+        out["warm"] = _warm(summary["warm"])
     elif name == "map-that-seeks":
         out |= _by_visits(summary["rows"], summary["unvisited"])
     return out
@@ -301,8 +300,18 @@ def _settings(rows: Sequence[Row]) -> list[str]:
         return f"{stays}; {_between('late_error_cad', 2)(row)}; {_number('guide_error_end_cad', 1)(row)}"
 
     return _side_by_side(
-        rows, "calibrated", "calibrated", lambda row: f"{row['engine']}, from {row['start_cad']:g}", cell
+        rows, "calibrated", "calibrated", lambda row: f"{_engine(row)}, from {row['start_cad']:g}", cell
     )
+
+
+def _warm(rows: Sequence[Row]) -> list[str]:
+    """MSE of both sines, by what the controller knows."""
+
+    def cell(row: Row) -> str:
+        return f"{_number('sine_mse_deg2', 5)(row)}, {_number('crossing_mse_deg2', 5)(row)}"
+
+    named = [{**row, "case": f"{row['preset']}, {row['wrong']}"} for row in rows]
+    return _side_by_side(named, "preset, what is wrong", "case", _words("controller"), cell)
 
 
 def _by_visits(rows: Sequence[Row], unvisited: Sequence[Row]) -> dict[str, list[str]]:

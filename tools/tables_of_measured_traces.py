@@ -14,7 +14,7 @@ from mgdd.identify.engine.calibration import compare_laws
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.identify.engine.timing_records import BestTiming
 
-__all__ = ["burn_laws", "demo", "fits", "members", "profile", "timing", "traces"]
+__all__ = ["burn_laws", "fits", "members", "profile", "timing", "traces"]
 
 LAW_NAMES = {
     ("triangle", "constant"): "triangle, 1.37",
@@ -42,16 +42,10 @@ def ranges() -> list[BestTiming]:
 
 
 def burn_laws() -> Rows:
+    names = ("rmse_percent", "imep_closed_error_percent", "onset_against_soi_cad", "largest_error_bar")
     return {
-        f"{LAW_NAMES[law]} {load}": [
-            own.rmse_percent,
-            own.imep_closed_error_percent,
-            own.onset_against_soi_cad,
-            own.largest_error_bar,
-            fit.model.wall_heat_scale,
-        ]
+        LAW_NAMES[law]: [*(getattr(own, name) for name in names for own in fit.loads), fit.model.wall_heat_scale]
         for law, fit in fits().items()
-        for load, own in zip(_LOADS, fit.loads, strict=True)
     }
 
 
@@ -67,15 +61,14 @@ def profile() -> Rows:
     return rows
 
 
-_ANSWERS = ("ca50_cad", "gain_percent", "free_ca50_cad", "free_gain_percent")
-
-
-def _answers(row: BestTiming) -> list[float]:
-    return [value for name in _ANSWERS for value in (getattr(row.best, name), *getattr(row, name))]
-
-
 def timing() -> Rows:
-    return {load: _answers(row) for load, row in zip(_LOADS, ranges(), strict=True)}
+    """Best CA50, move and gain of the headline with their ranges, under the own peak pressure and without limit."""
+    own = ("ca50_cad", "shift_cad", "gain_percent")
+    names = (*own, *(f"free_{name}" for name in own))
+    return {
+        load: [value for name in names for value in (getattr(row.best, name), *getattr(row, name))]
+        for load, row in zip(_LOADS, ranges(), strict=True)
+    }
 
 
 def members() -> Rows:
@@ -86,17 +79,8 @@ def members() -> Rows:
         if all(one.plausible for one in own):
             eta = [one.efficiency_gross for one in own]
             values = [one.rmse_percent for one in own] + [one.free_ca50_cad for one in own]
-            rows[answer.member.name.replace("_", " ")] = [*values, min(eta), max(eta)]
-    return rows
-
-
-def demo() -> Rows:
-    rows = {}
-    for load, row in zip(_LOADS, ranges(), strict=True):
-        best: Any = row.best
-        names = ("free_ca50_cad", "free_shift_cad", "free_gain_percent", "shift_cad", "gain_percent")
-        answers = [value for name in names for value in (getattr(best, name), *getattr(row, name))]
-        rows[load] = [best.rmse_percent, best.imep_closed_error_percent, *answers]
+            name = answer.member.name.removeprefix("double_wiebe, ").removesuffix(" (gamma fitted)")
+            rows[name] = [*values, min(eta), max(eta)]
     return rows
 
 

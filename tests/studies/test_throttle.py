@@ -210,10 +210,10 @@ def test_the_page_has_a_table_of_every_case(root: Path, study_tables: ModuleType
     ]
     tables = study_tables.tables("throttle-tracking", quick.summary | {"rows": rows})
     assert list(tables) == [*(case.text for case in CASES.values()), "warm"]
-    for lines in tables.values():
-        at = page.index(lines[0])
+    for name, lines in tables.items():
+        at, labels = page.index(lines[0]), 1 if name == "warm" else 2
         for made, printed in zip(lines[2:], page[at + 2 :], strict=False):
-            assert made.split(" | ")[:2] == printed.split(" | ")[:2]
+            assert made.split(" | ")[:labels] == printed.split(" | ")[:labels]
     made = study_tables.put_into(text, "throttle-tracking", quick.summary)
     assert made != text
     assert study_tables.put_into(made, "throttle-tracking", quick.summary) == made
