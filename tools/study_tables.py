@@ -250,7 +250,7 @@ def tables(name: str, summary: Mapping[str, Any]) -> dict[str, list[str]]:
         out["errors"] = _errors(summary["rows"])
     elif name == "calibrated-guide":
         out["settings"] = _settings(summary["settings"])
-    elif name == "throttle-tracking":
+    elif name == "throttle-tracking" and summary["warm"]:
         out["warm"] = _warm(summary["warm"])
     elif name == "map-that-seeks":
         out |= _by_visits(summary["rows"], summary["unvisited"])

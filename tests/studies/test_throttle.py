@@ -208,7 +208,14 @@ def test_the_page_has_a_table_of_every_case(root: Path, study_tables: ModuleType
         for preset in case.presets
         for controller in case.controllers
     ]
-    tables = study_tables.tables("throttle-tracking", quick.summary | {"rows": rows})
+    driven = {"controller": "cold", "sine_mse_deg2": 1e-3, "crossing_mse_deg2": 1e-3}
+    warm = [
+        driven | {"preset": preset, "wrong": f"{what} 40 % higher"}
+        for preset in ("P1", "P2", "P3")
+        for what in ("friction", "preload")
+    ]
+    warm += [warm[0] | {"controller": each} for each in ("after 2 s", "known")]
+    tables = study_tables.tables("throttle-tracking", quick.summary | {"rows": rows, "warm": warm})
     assert list(tables) == [*(case.text for case in CASES.values()), "warm"]
     for name, lines in tables.items():
         at, labels = page.index(lines[0]), 1 if name == "warm" else 2
