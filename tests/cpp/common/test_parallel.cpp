@@ -2,14 +2,13 @@
 // keeps what is finished.
 #include "mgdd/common/parallel.hpp"
 
-#include <gtest/gtest.h>
-
 #include <chrono>
 #include <mutex>
 #include <set>
 #include <stdexcept>
-#include <string>
 #include <thread>
+
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

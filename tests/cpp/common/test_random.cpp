@@ -1,12 +1,7 @@
 // Random numbers: published vectors, then the laws of the normal and uniform distribution, then golden bits.
 #include "mgdd/common/random.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-
-#include <gtest/gtest.h>
+#include "support/test.hpp"
 
 namespace mgdd::random {
 namespace {

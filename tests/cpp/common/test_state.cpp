@@ -1,9 +1,8 @@
 #include "mgdd/common/state.hpp"
 
 #include <Eigen/Core>
-#include <limits>
 
-#include <gtest/gtest.h>
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

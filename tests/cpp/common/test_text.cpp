@@ -1,15 +1,12 @@
 // Texts, names and errors: short, exact, and a field that stays in its context.
-#include <cmath>
-#include <limits>
 #include <variant>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

@@ -1,18 +1,11 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <map>
-#include <random>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/belief_review.hpp"
 #include "mgdd/control/friction_learner.hpp"
 #include "support/guided_plate.hpp"
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

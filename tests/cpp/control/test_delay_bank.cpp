@@ -2,16 +2,9 @@
 // than it was told.
 #include "mgdd/control/delay_bank.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/control/guided_predictive.hpp"
 #include "support/guided_plate.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

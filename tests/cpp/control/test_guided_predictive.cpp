@@ -2,18 +2,10 @@
 // rest. What a running system needs of it stands in test_guided_predictive_state, throttles in test_guided_throttle.
 #include "mgdd/control/guided_predictive.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <random>
 #include <span>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "support/guided_plate.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

@@ -1,17 +1,10 @@
 // The guided predictive controller as a part of a running system: bad input, taking over, a restart bit for bit, both
 // scalars, no allocation, refusals by name.
-#include <array>
-#include <cmath>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/control/guided_predictive.hpp"
 #include "support/guided_plate.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

@@ -1,12 +1,7 @@
 // PID of a plate: laws of each part, anti-windup, no steady error, mirrored plants, both scalars.
 #include "mgdd/control/pid.hpp"
 
-#include <cmath>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

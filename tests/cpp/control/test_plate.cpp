@@ -2,18 +2,11 @@
 // directions, slopes, and the box-constrained step over it.
 #include "mgdd/control/plate_model.hpp"
 
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <random>
 #include <span>
-#include <utility>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/control/move_qp.hpp"
 #include "mgdd/dynamics/predict.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

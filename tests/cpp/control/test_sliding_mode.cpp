@@ -2,15 +2,8 @@
 // up, mirrored plants, both scalars, a restart bit for bit, no allocation.
 #include "mgdd/control/sliding_mode.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

@@ -2,13 +2,9 @@
 // debouncing, what stays until acknowledged, no allocation.
 #include "mgdd/control/supervisor.hpp"
 
-#include <cmath>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "support/no_alloc.hpp"
 #include "support/supervisor_samples.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

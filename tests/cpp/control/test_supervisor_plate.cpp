@@ -1,12 +1,8 @@
 // The supervisor and its plate: jams, lost springs, what lasts too long, the way out of an open bridge; times and
 // silence of what it watches.
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/control/monitoring.hpp"
 #include "support/supervisor_samples.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 namespace {

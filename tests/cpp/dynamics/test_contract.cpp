@@ -1,13 +1,8 @@
 // Every model of the library on every scalar of the contract: the same run on double, float, duals and lanes, whole and
 // fractional delays, saved and restored states.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <span>
 #include <type_traits>
-#include <vector>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/dynamics/observer.hpp"
@@ -16,6 +11,7 @@
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::dynamics {

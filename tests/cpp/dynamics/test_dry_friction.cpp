@@ -1,11 +1,8 @@
 // What a controller asks about dry friction: stuck or sliding, and the duty at which motion begins.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/plant.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

@@ -1,9 +1,5 @@
 // Predictions, and the observer that starts them.
-#include <cmath>
 #include <span>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/dynamics/observer.hpp"
@@ -13,6 +9,7 @@
 #include "mgdd/throttle/plant.hpp"
 #include "support/no_alloc.hpp"
 #include "support/respond.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::dynamics {
 namespace {

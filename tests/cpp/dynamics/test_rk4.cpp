@@ -1,13 +1,7 @@
 // Runge-Kutta steps, and their sensitivities.
-#include <cmath>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/dynamics/rk4.hpp"
 #include "mgdd/dynamics/sensitivity.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::dynamics {
 namespace {

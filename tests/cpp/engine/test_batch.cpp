@@ -1,19 +1,11 @@
 // Cycles in lanes and cycles of one operating point that share their tables, against the cycle one by one.
 #include "mgdd/engine/batch/batch.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <initializer_list>
-#include <limits>
-#include <random>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/sensitivity.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

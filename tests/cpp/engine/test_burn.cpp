@@ -1,16 +1,10 @@
 // Burn laws, and the burn that a trace shows.
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/pressure/burn_window.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "support/engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

@@ -1,13 +1,10 @@
 // The cycle, and its derivatives.
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/gas.hpp"
 #include "mgdd/engine/sensitivity.hpp"
 #include "support/engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

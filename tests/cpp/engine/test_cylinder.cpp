@@ -1,10 +1,4 @@
 // What a cylinder holds: volume, charge, wall heat, and the rules between its numbers.
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/cycle.hpp"
@@ -13,6 +7,7 @@
 #include "mgdd/engine/ignition.hpp"
 #include "mgdd/engine/wall_heat.hpp"
 #include "support/engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

@@ -2,13 +2,7 @@
 // turns miscounted, wheels that are others than told.
 #include "mgdd/engine/crank/encoder.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <numbers>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

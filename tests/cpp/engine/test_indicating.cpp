@@ -1,11 +1,4 @@
 // Figures of cycles from their records, and the smoothing of a trace.
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/engine/geometry.hpp"
 #include "mgdd/engine/pressure/indicating.hpp"
 #include "mgdd/engine/pressure/rise_rate.hpp"
@@ -13,6 +6,7 @@
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "support/engine_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

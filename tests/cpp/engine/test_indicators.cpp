@@ -1,18 +1,10 @@
 // Figures of a cycle and what is made of them: peaks, ringing, the performance, nitric oxide by its proxies.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/indicators.hpp"
 #include "mgdd/engine/performance.hpp"
 #include "support/engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

@@ -1,12 +1,8 @@
 // Burned gas and the nitric oxide in it.
-#include <array>
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/engine/burned_gas.hpp"
 #include "mgdd/engine/cycle_trace.hpp"
 #include "mgdd/engine/thermal_no.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

@@ -1,17 +1,11 @@
 // Analysis of a trace, and its options.
-#include <algorithm>
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/pressure/pegging.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "mgdd/engine/pressure/trace_options.hpp"
 #include "support/engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

@@ -1,16 +1,10 @@
 // Warnings and refusals of the analysis: each is raised by what it names, and by nothing else.
 #include "mgdd/engine/pressure/doubts.hpp"
 
-#include <cmath>
-#include <random>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/pressure/pegging.hpp"
 #include "support/engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::engine {
 namespace {

@@ -1,13 +1,8 @@
 // Where a known curve stands: Bayes' rule against a slow direct integral, invariances, memory and lag.
 #include "mgdd/guide/curve_filter.hpp"
 
-#include <array>
-#include <cmath>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

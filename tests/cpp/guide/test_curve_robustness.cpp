@@ -1,16 +1,9 @@
 // What a guide of one input must bear: a level of J that drifts, a delay told wrong, a guide in another unit or far too
 // steep or flat, an optimum that moves, an input that is stuck. Laws and shares over seeds.
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <numbers>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/guide/curve_seeking.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

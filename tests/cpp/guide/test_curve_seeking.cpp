@@ -1,15 +1,9 @@
 // Curves, and seeking by them.
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/curve_seeking.hpp"
 #include "support/no_alloc.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

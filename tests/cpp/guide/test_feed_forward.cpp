@@ -1,15 +1,10 @@
 // Feed-forward of a guide, also from the model of an engine.
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/guide/feed_forward.hpp"
 #include "mgdd/guide/guided_engine.hpp"
 #include "mgdd/optimize/ask_tell/variant_seeker.hpp"
 #include "support/guided_case.hpp"
 #include "support/guided_engine_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

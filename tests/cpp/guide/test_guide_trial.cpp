@@ -1,14 +1,9 @@
 // Tests of a guide, and the trust that they leave.
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/guide/feed_forward.hpp"
 #include "mgdd/guide/trust.hpp"
 #include "support/guided_case.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

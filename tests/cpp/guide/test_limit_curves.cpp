@@ -1,12 +1,9 @@
 // Measured limits of a curve-guided seeker: allowed inputs by the guide's curves, or by lines that are learnt.
 #include "mgdd/guide/limit_curves.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
 #include "mgdd/guide/curve_seeking.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

@@ -2,13 +2,9 @@
 // ascent, its fallback, edges, points that have no optimum, real time.
 #include "mgdd/guide/model_optimum.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
 #include "support/engine_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

@@ -2,15 +2,9 @@
 // and what it cannot know it says.
 #include "mgdd/guide/online_calibration.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
 #include "support/calibration_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

@@ -1,17 +1,9 @@
 // Online calibration of engines that are not quite those of the guide: compression ratio, charge and walls, fuel, burn
 // and sensor are off within what is known of them, and the stated intervals hold all the same.
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/engine/geometry.hpp"
 #include "support/calibration_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

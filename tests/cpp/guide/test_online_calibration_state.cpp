@@ -1,15 +1,10 @@
 // Safeguards of the online calibration, and what a loop relies on: bounded work without allocation, a state that goes
 // on bit for bit, refusals that change nothing.
-#include <cmath>
-#include <functional>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/online_calibration.hpp"
 #include "support/calibration_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 namespace {

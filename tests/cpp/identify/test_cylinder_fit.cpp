@@ -1,15 +1,10 @@
 // Calibration of a cylinder by its traces, and the residuals of it.
-#include <algorithm>
-#include <cmath>
-#include <random>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/identify/engine/cylinder_fit.hpp"
 #include "mgdd/identify/engine/cylinder_residual.hpp"
 #include "support/engine_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::identify {
 namespace {

@@ -1,7 +1,4 @@
 // On-line update of PW-R: tracks a change of the supply, rests without excitation, gates hold.
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <type_traits>
 
 #include "mgdd/common/state.hpp"
@@ -10,6 +7,7 @@
 #include "mgdd/identify/online/recursive_pw_r.hpp"
 #include "mgdd/identify/online/recursive_window.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::identify {

@@ -1,14 +1,10 @@
 #include "mgdd/identify/output_error.hpp"
 
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/dynamics/rk4.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::identify {
 namespace {

@@ -1,12 +1,8 @@
 #include "mgdd/identify/throttle/first_principle_fit.hpp"
 
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/identify/free_run_fit.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::identify {

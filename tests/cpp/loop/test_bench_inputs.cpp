@@ -1,16 +1,10 @@
 // Laws of the further inputs of the bench: each is what the cycle model makes of it, and none of it is today's bench.
-#include <cmath>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/engine/recirculation.hpp"
 #include "mgdd/loop/engine_loop.hpp"
 #include "mgdd/loop/virtual_engine.hpp"
 #include "mgdd/loop/virtual_engine_lanes.hpp"
 #include "support/bench_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

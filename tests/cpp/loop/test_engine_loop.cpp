@@ -1,17 +1,13 @@
 // Loops around a bench: figures by their definitions, no allocation, functions as plants, many at once.
-#include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <stdexcept>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/engine_loop.hpp"
 #include "mgdd/loop/function_plant.hpp"
 #include "mgdd/loop/monte_carlo.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

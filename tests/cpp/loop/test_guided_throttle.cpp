@@ -1,16 +1,9 @@
 // The guided predictive controller on the virtual throttle: facts of the plain form on P1, and what the default does on
 // throttles that it does not know. Protocol: 0.03 deg of noise, 12 bits, a duty acts one sample after it was computed.
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <numbers>
 #include <ostream>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/loop/throttle_controllers.hpp"
+#include "support/test.hpp"
 #include "support/throttle_presets.hpp"
 
 namespace mgdd::loop {

@@ -1,17 +1,12 @@
 // Sensors of a bench: lags and delays of an analyser, the pressure that a sensor shows.
-#include <algorithm>
-#include <cmath>
 #include <complex>
-#include <numbers>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/units.hpp"
 #include "mgdd/loop/pressure_sensor.hpp"
 #include "mgdd/loop/transport_lag.hpp"
 #include "mgdd/loop/virtual_engine.hpp"
 #include "support/bench_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

@@ -1,14 +1,9 @@
 // Faults of the virtual throttle, and the figures of a loop around it.
-#include <cmath>
-#include <cstddef>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/loop/throttle_faults.hpp"
 #include "mgdd/loop/throttle_loop.hpp"
 #include "mgdd/loop/virtual_throttle.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

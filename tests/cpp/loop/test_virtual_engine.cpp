@@ -1,17 +1,10 @@
 // Laws of the virtual bench: its sensors are their closed forms, its chance has its statistics.
 #include "mgdd/loop/virtual_engine.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "support/bench_case.hpp"
 #include "support/engine_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

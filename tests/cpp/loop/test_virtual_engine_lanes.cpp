@@ -2,17 +2,10 @@
 // a cycle that does not exist; refusals; no allocation.
 #include "mgdd/loop/virtual_engine_lanes.hpp"
 
-#include <cmath>
-#include <cstddef>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

@@ -1,11 +1,4 @@
 // The virtual throttle alone and side by side.
-#include <cmath>
-#include <cstddef>
-#include <limits>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/control/pid.hpp"
 #include "mgdd/loop/throttle_controllers.hpp"
@@ -13,6 +6,7 @@
 #include "mgdd/loop/virtual_throttle_lanes.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::loop {
 namespace {

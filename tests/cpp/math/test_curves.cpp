@@ -1,12 +1,7 @@
 // Curves between their nodes: cubics, and the argument of a monotone function.
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/math/cubic_weights.hpp"
 #include "mgdd/math/monotone_inverse.hpp"
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

@@ -1,9 +1,7 @@
 // Dual numbers against derivatives known in closed form.
 #include "mgdd/math/dual.hpp"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

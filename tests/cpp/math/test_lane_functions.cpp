@@ -1,15 +1,8 @@
 // Functions of numbers and lanes against the library: powers, exponential, logarithm and hyperbolic tangent.
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <string>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/math/fast_power.hpp"
 #include "mgdd/math/fast_tanh.hpp"
 #include "mgdd/math/lane_functions.hpp"
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

@@ -1,15 +1,11 @@
 // Statistics: lines through points, the time of an autocorrelation, points of a Latin hypercube.
-#include <cmath>
 #include <set>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/math/autocorrelation.hpp"
 #include "mgdd/math/latin_hypercube.hpp"
 #include "mgdd/math/line_fit.hpp"
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

@@ -1,15 +1,11 @@
 // Filters without a shift of phase: low passes of second order, and bands.
 #include <Eigen/Core>
-#include <cmath>
-#include <numbers>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/math/band_pass.hpp"
 #include "mgdd/math/zero_phase.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd {
 namespace {

@@ -1,14 +1,9 @@
 // Laws of the climb, on functions of its own.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <vector>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/belief/process_kernel.hpp"
 #include "mgdd/optimize/laws/climb.hpp"
 #include "mgdd/optimize/laws/map_seeking.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

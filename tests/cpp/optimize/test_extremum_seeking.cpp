@@ -1,12 +1,6 @@
 // Extremum seeking by its laws, and the dither behind a sensor that is late.
-#include <cmath>
-#include <cstddef>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -1,12 +1,8 @@
 // First readings, and readings that fail.
-#include <algorithm>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/optimize/watch/failure_watch.hpp"
 #include "mgdd/optimize/watch/first_readings.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

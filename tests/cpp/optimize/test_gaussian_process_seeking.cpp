@@ -1,18 +1,11 @@
 // Seeking with Gaussian processes: few readings to the best of several inputs, limits, drift, restarts, cycles that
 // fail.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "support/coupled_map.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

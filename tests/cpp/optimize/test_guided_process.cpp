@@ -1,13 +1,7 @@
 // A rough model as the mean of a Gaussian process: its table, and what it is worth to the seeker.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <vector>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -1,13 +1,10 @@
 #include "mgdd/optimize/learning/iterative_learning.hpp"
 
-#include <algorithm>
-#include <cmath>
-
-#include <gtest/gtest.h>
 #include <Eigen/Core>
 
 #include "mgdd/common/enum_names.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

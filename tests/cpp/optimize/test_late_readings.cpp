@@ -1,14 +1,10 @@
 // Readings that come late, and the window that a lag leaves of them.
-#include <cmath>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "mgdd/optimize/watch/lag_window.hpp"
 #include "support/coupled_map.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -1,10 +1,6 @@
 // What a search for a map does with readings that are odd, and with limits that it cannot be sure of.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-
 #include "support/spark_engine.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

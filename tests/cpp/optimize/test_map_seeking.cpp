@@ -1,13 +1,8 @@
 // A search for a map on a spark engine of its own.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <vector>
-
 #include "mgdd/common/state.hpp"
 #include "support/no_alloc.hpp"
 #include "support/spark_engine.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -1,14 +1,9 @@
 // Fits beside their search: many starts, bounds, and what the data do not tell.
-#include <array>
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/optimize/least_squares/multi_start.hpp"
 #include "support/fit_cases.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -1,14 +1,10 @@
 // The process against plain Bayesian algebra written anew, and the knowledge gradient against a sum over many draws.
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <array>
-#include <cmath>
-#include <vector>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/belief/process_model.hpp"
 #include "mgdd/optimize/laws/most_worth.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -1,10 +1,5 @@
 // Recursive least squares, and errors of an estimate whose residuals hang together.
 #include <Eigen/Dense>
-#include <cmath>
-#include <limits>
-#include <string>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
@@ -12,6 +7,7 @@
 #include "mgdd/optimize/least_squares/block_sandwich.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 namespace {

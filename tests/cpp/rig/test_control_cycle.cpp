@@ -1,17 +1,13 @@
 // One turn after the other, without a thread or a clock: the loop does nothing before it is told to, opens the bridge
 // for every trouble of bus, deadlines and references, and its samples replay the gate.
-#include <cmath>
-#include <cstdint>
 #include <memory>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/control_cycle.hpp"
 #include "mgdd/rig/monotonic_clock.hpp"
 #include "support/cycle_rig.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 #include "support/throttle_on_bus.hpp"
 
 namespace mgdd::rig {

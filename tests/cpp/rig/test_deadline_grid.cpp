@@ -1,17 +1,10 @@
 // Deadlines on their grid, and the histogram of what was late.
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <limits>
 #include <numeric>
-#include <random>
 #include <thread>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/rig/deadline_grid.hpp"
 #include "mgdd/rig/latency_histogram.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::rig {
 namespace {

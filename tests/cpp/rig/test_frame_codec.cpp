@@ -1,14 +1,8 @@
 // Between frames and numbers: every number to its place and back, protection on both ways, and what a codec refuses.
 #include "mgdd/rig/frame_codec.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <string>
-
 #include "mgdd/common/error.hpp"
+#include "support/test.hpp"
 #include "support/throttle_on_bus.hpp"
 
 namespace mgdd::rig {

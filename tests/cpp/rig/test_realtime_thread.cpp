@@ -1,19 +1,15 @@
 // The real-time thread, and the loop on it.
 #include <atomic>
 #include <chrono>
-#include <cstdint>
 #include <memory>
-#include <string>
 #include <thread>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/monotonic_clock.hpp"
 #include "mgdd/rig/realtime_loop.hpp"
 #include "mgdd/rig/realtime_thread.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 #include "support/throttle_on_bus.hpp"
 
 namespace mgdd::rig {

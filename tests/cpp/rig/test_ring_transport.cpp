@@ -1,15 +1,12 @@
 // Transport in memory, and the state of a bus.
-#include <cstdint>
 #include <string_view>
 #include <thread>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/bus_monitor.hpp"
 #include "mgdd/rig/monotonic_clock.hpp"
 #include "mgdd/rig/ring_transport.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::rig {
 namespace {

@@ -1,15 +1,8 @@
 // Safety gate: the duty that leaves, the way through its states, requests, envelope, audit list and refused states.
-#include <array>
-#include <cmath>
-#include <limits>
-#include <string>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/safety_gate.hpp"
 #include "support/safety_samples.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::rig {
 namespace {

@@ -1,12 +1,6 @@
 // Safety gate: one law per hazard, on made-up cycles with numbers that nothing else has.
-#include <array>
-#include <cmath>
-#include <limits>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "support/safety_samples.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::rig {
 namespace {

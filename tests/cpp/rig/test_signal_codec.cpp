@@ -1,15 +1,8 @@
 // Numbers in a payload, and its protection.
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/e2e.hpp"
 #include "mgdd/rig/signal_codec.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::rig {
 namespace {

@@ -1,14 +1,11 @@
 // Between two threads: a ring that loses nothing, and the latest value.
-#include <array>
 #include <atomic>
-#include <cstdint>
 #include <thread>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/latest_value.hpp"
 #include "mgdd/rig/spsc_ring.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::rig {
 namespace {

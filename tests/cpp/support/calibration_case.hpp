@@ -1,16 +1,10 @@
 // A virtual engine with a pressure sensor beside an online calibration of a guide that is wrong about it.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <functional>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/guide/online_calibration.hpp"
 #include "mgdd/loop/virtual_engine.hpp"
 #include "support/bench_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::test_support {
 

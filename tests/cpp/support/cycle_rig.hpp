@@ -1,12 +1,8 @@
 // One turn of a control cycle after the other, without a thread or a clock, with a throttle behind its bus.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdint>
-#include <vector>
-
 #include "mgdd/rig/control_cycle.hpp"
+#include "support/test.hpp"
 #include "support/throttle_on_bus.hpp"
 
 namespace mgdd::test {

@@ -1,12 +1,11 @@
 #include "support/engine_case.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 
 #include "mgdd/common/units.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::test_support {
 namespace {

@@ -1,13 +1,9 @@
 // What tests of the feed-forward share: what a guide says, a guided seeker, and cycles on a parabola.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdint>
-#include <vector>
-
 #include "mgdd/guide/feed_forward.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 using namespace optimize;

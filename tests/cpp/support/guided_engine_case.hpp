@@ -2,16 +2,12 @@
 // bench.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdint>
 #include <optional>
-#include <utility>
-#include <vector>
 
 #include "mgdd/guide/guided_engine.hpp"
 #include "mgdd/loop/virtual_engine.hpp"
 #include "support/seeker_case.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::guide {
 

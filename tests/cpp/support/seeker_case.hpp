@@ -2,23 +2,16 @@
 // of each seeker and form.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
 #include <initializer_list>
-#include <numbers>
 #include <optional>
-#include <string>
 #include <type_traits>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/ask_tell/seekers.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::optimize {
 

@@ -2,15 +2,9 @@
 // its map.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <vector>
-
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/laws/map_seeking.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::test_support {
 

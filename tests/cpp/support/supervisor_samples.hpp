@@ -1,11 +1,8 @@
 // Made-up samples for the supervisor of a throttle controller, and settings that nothing else has.
 #pragma once
 
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/control/supervisor.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::control {
 

@@ -1,11 +1,6 @@
 // The first-principle groups: the run of the plant that they stand for, terminal speeds by hand, delay, refusals.
 #include "mgdd/throttle/models/first_principle.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <span>
 #include <string_view>
 
@@ -14,6 +9,7 @@
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
 #include "support/first_principle_case.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::throttle {

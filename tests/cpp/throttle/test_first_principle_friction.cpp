@@ -1,12 +1,8 @@
 // The first-principle groups: static friction and its drop, presliding, and the gap between motor and plate.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "support/asymmetric_throttle.hpp"
 #include "support/first_principle_case.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::throttle {

@@ -1,14 +1,10 @@
 // Every step of the plant solves the equations it stands for. They are written here once more, term by term in the
 // units of the parameters, and the friction that a step has applied is what is left of the torque balance.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 #include <map>
-#include <string>
 
 #include "mgdd/common/random.hpp"
 #include "support/asymmetric_throttle.hpp"
+#include "support/test.hpp"
 #include "support/throttle_case.hpp"
 
 namespace mgdd::throttle {

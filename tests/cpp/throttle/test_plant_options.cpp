@@ -1,17 +1,13 @@
 // Every combination of options: nothing throws, lanes hold the bits of plain code, columns act from their own sample
 // on, and a side without friction is the limit of one with little; test_plant_equations.cpp has the rest.
-#include <cmath>
-#include <cstddef>
 #include <type_traits>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/math/dual.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
+#include "support/test.hpp"
 #include "support/throttle_case.hpp"
 
 namespace mgdd::throttle {

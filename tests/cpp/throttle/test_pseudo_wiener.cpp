@@ -1,14 +1,9 @@
 // Pseudo-Wiener models: settings, delays, sensitivities, lanes. Their equations stand in test_pw_*_equations.cpp.
-#include <cmath>
-#include <string>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "support/asymmetric_pseudo_wiener.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::throttle {

@@ -1,16 +1,11 @@
 // PW-R against its equations, written once more, with parameters that differ from their defaults and from side to side.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <numbers>
 #include <tuple>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_pseudo_wiener.hpp"
 #include "support/asymmetric_throttle.hpp"
+#include "support/test.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::throttle {

@@ -1,12 +1,6 @@
 // PW-W and PW-P against their equations, written once more, with parameters that differ from their defaults.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <vector>
-
 #include "support/asymmetric_pseudo_wiener.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

@@ -1,15 +1,9 @@
 // The pair of sensors sample by sample against its equations, with settings that differ from their defaults; faults
 // that are short or lie at the tolerance.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/throttle/sensors.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

@@ -1,12 +1,7 @@
 // Single samples from plain numbers: the runs of the same models, and what is refused.
 #include "mgdd/throttle/stepper.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
 #include <span>
-#include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/dynamics/simulate.hpp"
@@ -14,6 +9,7 @@
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_pseudo_wiener.hpp"
 #include "support/asymmetric_throttle.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

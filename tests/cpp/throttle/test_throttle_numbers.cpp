@@ -1,16 +1,10 @@
 // Numbers of a throttle: what a user gets who says nothing, what each field allows, and rules between fields.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <string>
-#include <utility>
-
 #include "mgdd/common/error.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/sensors.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

@@ -1,13 +1,8 @@
 // From a pedal to the angle of the plate: the chain, and its tracker sample by sample.
-#include <cmath>
-#include <limits>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/throttle/demand/demand_chain.hpp"
 #include "support/demand_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

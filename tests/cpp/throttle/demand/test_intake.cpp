@@ -2,16 +2,11 @@
 // opinion), torque and its air.
 #include "mgdd/throttle/demand/intake.hpp"
 
-#include <cmath>
-#include <limits>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/rk4.hpp"
 #include "support/demand_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {

@@ -1,13 +1,8 @@
 // Flow past the plate: the bore that it leaves open, and the orifice.
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "mgdd/common/units.hpp"
 #include "mgdd/throttle/demand/bore.hpp"
 #include "mgdd/throttle/demand/orifice.hpp"
+#include "support/test.hpp"
 
 namespace mgdd::throttle {
 namespace {
