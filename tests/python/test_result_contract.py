@@ -26,7 +26,7 @@ from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.loop import VirtualEngine, run_seeker, seek, seek_front, seek_map, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
-from mgdd.plot.response import response_diagnostics
+from mgdd.plot.identification import response_diagnostics
 from mgdd.report import Report
 from mgdd.results.labels import check_labels
 from mgdd.results.result import Result

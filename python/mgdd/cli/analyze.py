@@ -31,8 +31,7 @@ from mgdd.io.pressure import mean_cycle
 from mgdd.presets.preset import Preset
 from mgdd.report import Section, Table
 from mgdd.report.page import write_page
-from mgdd.report.records import DRAWN_CYCLES, record_section
-from mgdd.results.labels import named_label
+from mgdd.report.records import DRAWN_CYCLES, figures_table, record_section
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,16 +44,8 @@ _ANALYSIS = Options(
     "knock_band_hz", "knock_window_cad", "knock_threshold_bar", gamma="analysis_gamma", n_cylinders="cylinders",
 )  # fmt: skip
 _BRAKE = Options(analyze, "bmep_bar", "brake_torque_nm")
-_CHECKED = Options(check_pressure, "pegging", "pegging_exponent", "inlet_pressure_kpa", "bmep_bar", "brake_torque_nm",
-                   n_cylinders="cylinders")  # fmt: skip
+_STATED = Options(check_pressure, "bmep_bar", "brake_torque_nm", n_cylinders="cylinders")
 _FAILED, _REFUSED = 1, 2  # exit codes where a file fails its check, and where it is refused
-# Columns of a record: what stands before and after the name of a figure.
-_COLUMNS = {
-    "mean": ("", ""),
-    "standard deviation": ("std_", ""),
-    "COV [%]": ("cov_", "_percent"),
-    "averaged cycle": ("cycle_mean_", ""),
-}
 # Figures of a record that a cycle does not have.
 _OF_RECORDS = ("lnv_", "ringing_", "tangential_", "knock_")
 
@@ -112,12 +103,12 @@ def _analyze(args: argparse.Namespace) -> None:
             result, payload, text = _one(args, trace, engine, own, traces=not record)
             checked = None
             if args.report:
-                own_checks = {"assumed": assumed, "fuel_mg": fuel_mg, **_CHECKED.given(args)}
+                own_checks = {"assumed": assumed, "fuel_mg": fuel_mg, **PEGGING.given(args), **_STATED.given(args)}
                 checked = check_pressure(trace, cylinder, point=point, **own_checks)
         except DataError as error:  # one that is refused does not stop the others
             if not several and args.report is None:
                 raise
-            result, checked = None, PressureCheck(Path(file).name, (Check("file", "fail", str(error)),))
+            result, checked = None, _refused(file, error)
             payload = {"file": checked.file, "error": error_of(error, str(error))}
             text = [f"{checked.file}: refused: {error}"]
             _LOG.error("%s", error)
@@ -165,7 +156,11 @@ def _one(
         "warnings": result.attrs["warnings"].splitlines(),
         "open": result.attrs["open"].splitlines(),
     }
-    text: list[str | Table] = _table(payload) if "cycles" in payload else [lines(payload)]
+    text: list[str | Table] = [lines(payload)]
+    if "cycles" in payload:
+        plain = (str, int)
+        said = {name: v for name, v in payload.items() if isinstance(v, plain) or name.startswith(_OF_RECORDS)}
+        text = [lines(said), "", figures_table(result, by_name=True)]
     if not args.tdc:
         text += [f"open: {each}; --tdc scans it, a motored record shows it" for each in payload["open"]]
     if args.tdc:
@@ -224,26 +219,8 @@ def _figures(result: xr.Dataset) -> dict[str, float]:
     return {"cycles": result.attrs["cycles"], **means, **rest}
 
 
-def _table(payload: dict[str, Any]) -> list[str | Table]:
-    """Set mean, scatter and averaged cycle of a record side by side."""
-
-    def cell(name: str) -> str:
-        value = payload.get(name)
-        return "–" if value is None or value != value else f"{value:.5g}"
-
-    names = [name.removeprefix("cycle_mean_") for name in payload if name.startswith("cycle_mean_")]
-    rows = tuple(
-        (
-            name,
-            *(cell(f"{before}{name}{after}") for before, after in _COLUMNS.values()),
-            named_label(name).units,
-        )
-        for name in names
-    )
-    said = {
-        name: value for name, value in payload.items() if isinstance(value, str | int) or name.startswith(_OF_RECORDS)
-    }
-    return [lines(said), "", Table(columns=("figure", *_COLUMNS, "unit"), rows=rows)]
+def _refused(file: str, error: DataError) -> PressureCheck:
+    return PressureCheck(Path(file).name, (Check("file", "fail", str(error)),))
 
 
 def _check_analysis(args: argparse.Namespace) -> None:
@@ -258,9 +235,6 @@ def _check_analysis(args: argparse.Namespace) -> None:
         raise ParameterError("--smoothing-cutoff-hz acts with --smoothing low_pass only: choose it")
     if args.cylinders is not None and args.brake_torque_nm is None:
         raise ParameterError("--cylinders acts with --brake-torque-nm only: give it")
-
-
-_STATED = Options(check_pressure, "bmep_bar", "brake_torque_nm", n_cylinders="cylinders")
 
 
 def _add_check(parser: Any) -> None:
@@ -281,7 +255,7 @@ def _check(args: argparse.Namespace) -> None:
         try:
             return check_pressure(read(), cylinder, point=point, assumed=assumed, **given)
         except DataError as error:
-            return PressureCheck(Path(file).name, (Check("file", "fail", str(error)),))
+            return _refused(file, error)
 
     reports = [report(file, read) for file, read in readers_of(args).items()]
     payload = {

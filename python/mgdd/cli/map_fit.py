@@ -21,7 +21,7 @@ from mgdd.io.binary_files import read_netcdf
 from mgdd.io.files import write_whole_text
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import POINT, input_names, read_points
-from mgdd.plot.response import response_diagnostics
+from mgdd.plot.identification import response_diagnostics
 from mgdd.plot.style import drawn
 from mgdd.results.labels import label_of
 from mgdd.surrogate import ResponseModel, fit_response

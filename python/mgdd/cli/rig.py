@@ -16,8 +16,7 @@ from mgdd.cli.output import check_file, emit
 from mgdd.cli.rig_run import add_bus
 from mgdd.report import Table
 from mgdd.rig import Experiment, SafetyEnvelope, SignalMap
-from mgdd.rig.can.hub import Hub
-from mgdd.rig.can.hub_faults import BusFault
+from mgdd.rig.can.hub import BusFault, Hub
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.processes import noted_signals

@@ -22,9 +22,9 @@ from mgdd.cli.progress import Stopped
 from mgdd.errors import DataError, ParameterError
 from mgdd.rig import CanRig, Experiment, Recorder, export_record, run_experiment, watch
 from mgdd.rig.can.can_rig import MODES
-from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment import CheckedExperiment, ExperimentResult, check_experiment
+from mgdd.rig.recorder import RecordedBus
 
 if TYPE_CHECKING:
     from mgdd.rig.experiment.stand import Cycle

@@ -7,7 +7,7 @@ is finished.
 from __future__ import annotations
 
 from mgdd._rooms import furnish as _furnish
-from mgdd.parallel.items import map_items
+from mgdd.parallel.chunks import map_items
 
 __all__ = ["map_items"]
 

@@ -11,11 +11,9 @@ from mgdd._rooms import furnish as _furnish
 from mgdd.plot.cycles import cycles, pressure
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
-from mgdd.plot.seeking import seeking
-from mgdd.plot.sensors import sensors
+from mgdd.plot.seeking import seeking, sensors
 from mgdd.plot.throttle import holding_duty, throttle_run
-from mgdd.plot.timing import timing
-from mgdd.plot.trade_off import trade_off
+from mgdd.plot.timing import timing, trade_off
 
 __all__ = [
     "correlation_matrix",

@@ -8,8 +8,7 @@ import numpy as np
 
 from mgdd.plot.cycles import pressure
 from mgdd.plot.maps import map_cells
-from mgdd.plot.seeking import seeking
-from mgdd.plot.sensors import sensors
+from mgdd.plot.seeking import seeking, sensors
 from mgdd.plot.style import BLACK, axis_label, divide, minus, new_axes, require
 from mgdd.plot.throttle import throttle_run
 from mgdd.plot.timing import timing

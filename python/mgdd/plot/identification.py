@@ -1,18 +1,21 @@
-"""What a validation shows: error ahead, autocorrelation of residuals, and which parameters are entangled."""
+"""Diagnostics of fits: error ahead, residuals, entangled parameters, and a response model over its factors."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, divide, legend, minus, new_axes, require
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.gridspec import SubplotSpec
+    from numpy.typing import NDArray
 
     from mgdd.results.result import Result
 
@@ -117,3 +120,101 @@ def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = No
     ax.set_xticks(range(n), names, rotation=40, ha="right", rotation_mode="anchor", fontsize="small")
     ax.set_yticks(range(n), names, fontsize="small")
     return ax
+
+
+_CUTS_IN_A_ROW = 3
+_NEEDED = (
+    "point", "measured", "fitted", "left_out", "studentised", "normal_score", "outlier", "outlier_bound", "factor",
+    "cut", "cut_mean", "cut_lower", "cut_upper",
+)  # fmt: skip
+
+
+def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
+    """Draw the diagnostics of `mgdd.surrogate.fit_response`: four panels of residuals, and a cut along each factor.
+
+    Points beyond the bound for outliers are squares.
+    """
+    diagnostics = require("diagnostics", diagnostics, _NEEDED, "mgdd.surrogate.fit_response")
+    names = [str(name) for name in diagnostics["factor"].to_numpy()]
+    require("diagnostics", diagnostics, tuple(names), "mgdd.surrogate.fit_response")
+    rows = -(-len(names) // _CUTS_IN_A_ROW)
+    ax = new_axes(ax, height=5.4 + 2.3 * rows)
+    panels, cuts = _divided(ax, rows, len(names))
+    data, odd = diagnostics, diagnostics["outlier"].to_numpy().astype(bool)
+    response = label_of(data["measured"])
+    quantity = response.long_name.removesuffix(", measured")
+    measured, left_out = data["measured"].to_numpy(), data["left_out"].to_numpy()
+    ends = [min(np.min(measured), np.nanmin(left_out)), max(np.max(measured), np.nanmax(left_out))]
+    ax.plot(ends, ends, "-", color=GREY, linewidth=0.8)
+    lines = _points(ax, left_out, measured, odd)
+    ax.set(xlabel=f"from the other points [{response.units}]", ylabel=f"{quantity}\nmeasured [{response.units}]")
+    bound, residual = float(data["outlier_bound"]), data["studentised"].to_numpy()
+    over = {
+        "point": (data["point"].to_numpy(), axis_label(data, "point")),
+        "fitted": (data["fitted"].to_numpy(), f"fitted [{response.units}]"),
+        "normal_score": (data["normal_score"].to_numpy(), axis_label(data, "normal_score")),
+    }
+    for panel, (values, label) in zip(panels[1:], over.values(), strict=True):
+        _points(panel, values, residual, odd)
+        panel.set(xlabel=label, ylabel=axis_label(data, "studentised"))
+        panel.axhline(0.0, color=GREY, linewidth=0.8)
+        for edge in (-bound, bound):
+            if np.isfinite(bound):
+                panel.axhline(edge, color=ORANGE, linestyle="--", linewidth=0.9)
+    scores = over["normal_score"][0]
+    panels[3].plot([scores.min(), scores.max()], [scores.min(), scores.max()], "-", color=GREY, linewidth=0.8)
+    lines += _cuts(cuts, data, names, f"{quantity}\n[{response.units}]")
+    for panel in (*panels, *cuts):
+        panel.grid(alpha=0.3)
+    legend(ax, list({minus(str(line.get_label())): line for line in lines}.values()), columns=1)
+    return ax
+
+
+def _points(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], odd: NDArray[np.bool_]) -> list[Artist]:
+    lines: list[Artist] = [*ax.plot(x[~odd], y[~odd], "o", color=BLUE, markersize=4, label="point")]
+    if odd.any():
+        lines += ax.plot(x[odd], y[odd], "s", color=ORANGE, markersize=6, label="outlier")
+    return lines
+
+
+def _cuts(axes: list[Axes], data: xr.Dataset, names: list[str], label: str) -> list[Artist]:
+    lines: list[Artist] = []
+    for place, (ax, name) in enumerate(zip(axes, names, strict=True)):
+        cut = data.isel(factor=place)
+        percent = 100.0 * float(data.attrs.get("level", 0.95))
+        band = ax.fill_between(
+            cut["cut"], cut["cut_lower"], cut["cut_upper"], color=GREY, alpha=0.3, linewidth=0.0,
+            label=f"{percent:.0f} % of new measurements",
+        )  # fmt: skip
+        (line,) = ax.plot(cut["cut"], cut["cut_mean"], "-", color=BLACK, label="model, other factors at their medians")
+        ax.set_xlabel(axis_label(data, name), fontsize="small")
+        if place % _CUTS_IN_A_ROW == 0:
+            ax.set_ylabel(label)
+        else:
+            ax.sharey(axes[place - place % _CUTS_IN_A_ROW])
+            ax.tick_params(labelleft=False)
+        lines = lines or [line, band]
+    return lines
+
+
+def _divided(ax: Axes, rows: int, cuts: int) -> tuple[list[Axes], list[Axes]]:
+    """Divide axes into two rows of two panels, and rows of cuts below."""
+    spec, figure = ax.get_subplotspec(), ax.figure
+    heights: dict[str, Any] = {"height_ratios": (2.0, 0.85 * rows)}
+    outer: Any
+    if spec is not None:
+        outer = spec.subgridspec(2, 1, **heights)
+    else:
+        left, bottom, width, height = ax.get_position().bounds
+        box = {"left": left, "bottom": bottom, "right": left + width, "top": bottom + height, "hspace": 0.35}
+        outer = figure.add_gridspec(2, 1, **box, **heights)
+    wide = {} if spec is not None else {"wspace": 0.4, "hspace": 0.5}
+    upper, lower = outer[0].subgridspec(2, 2, **wide), outer[1].subgridspec(rows, min(cuts, _CUTS_IN_A_ROW), **wide)
+
+    def panel(place: SubplotSpec) -> Axes:
+        made: Axes = figure.add_subplot(place)
+        return made
+
+    ax.set_subplotspec(upper[0, 0])
+    panels = [ax, *(panel(upper[place]) for place in ((0, 1), (1, 0), (1, 1)))]
+    return panels, [panel(lower[place // _CUTS_IN_A_ROW, place % _CUTS_IN_A_ROW]) for place in range(cuts)]

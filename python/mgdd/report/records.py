@@ -48,7 +48,7 @@ def record_section(report: PressureCheck, figures: xr.Dataset | None, traces: xr
         title=title,
         text=tuple(_text(figures, drawn_from)),
         items=tuple(items),
-        table=_table(figures),
+        table=figures_table(figures),
         figures=dict(_figures(figures, drawn_from)),
     )
 
@@ -79,8 +79,8 @@ def _text(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[str]:
     yield f"{ringing} between {low:g} and {high:g} kHz; the first tangential mode of the bore is {mode:.2f} kHz.{knock}"
 
 
-def _table(figures: xr.Dataset) -> Table:
-    """Set out every figure: of a record mean, scatter and percentiles."""
+def figures_table(figures: xr.Dataset, *, by_name: bool = False) -> Table:
+    """Set out every figure, by what it is or by its name: of a record mean, scatter and percentiles."""
     if "cycles" not in figures.attrs:
         single = [(name, v) for name, v in figures.data_vars.items() if v.ndim == 0 and np.isfinite(v)]
         rows = [(label_of(v).long_name, as_number(float(v)), label_of(v).units) for _, v in single]
@@ -91,7 +91,8 @@ def _table(figures: xr.Dataset) -> Table:
         statistics = (figures.get(f"{before}{name}{after}") for before, after in _STATISTICS.values())
         cells = ["–" if value is None else as_number(float(value)) for value in statistics]
         if any(cell != "–" for cell in cells):
-            table.append((label_of(figures[name]).long_name, *cells, label_of(figures[name]).units))
+            label = label_of(figures[name])
+            table.append((name if by_name else label.long_name, *cells, label.units))
     return Table(columns=("figure", *_STATISTICS, "unit"), rows=tuple(table))
 
 

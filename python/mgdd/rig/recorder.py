@@ -1,4 +1,4 @@
-"""The record of a run: one append-only file that survives the process that writes it."""
+"""The record of a run: one append-only file that survives the process that writes it, and a bus that fills it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from mgdd import _core
 from mgdd._core.rig import Frame, RecordWriter
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.results.labels import to_jsonable
+from mgdd.rig.can.transport import Bus, changed
 
 _OWN = "time_s"
 
@@ -154,3 +155,35 @@ def _other_names(table: str, names: Sequence[str], values: Mapping[str, float]) 
         return ParameterError.of("values", unknown[0], f"a name of table {table}: {hint}")
     missing = next(name for name in names if name not in values)
     return ParameterError.of("values", missing, f"given in every row of table {table}: NaN where there is none")
+
+
+class RecordedBus:
+    """Passes everything on to another bus, and appends every frame to a record."""
+
+    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+        self.bus, self.recorder = bus, recorder
+        self.name, self.shared, self.stays_here = bus.name, bus.shared, bool(getattr(bus, "stays_here", False))
+        self.open, self.close, self.claim = bus.open, bus.close, bus.claim
+        # Identifiers that another socket of this process sends: what is received of them is recorded as sent.
+        self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
+
+    @property
+    def counters(self) -> dict[str, Any]:
+        """What the bus counts."""
+        return dict(getattr(self.bus, "counters", {}))
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:
+        """Send a frame; what the bus did not take is not recorded."""
+        self.bus.send(frame, final=final)
+        self._append(frame, received=False)
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame."""
+        frame = self.bus.receive(timeout_s)
+        if frame is not None:
+            self._append(frame, received=(frame.id, frame.extended) not in self.sent_elsewhere)
+        return frame
+
+    def _append(self, frame: Frame, *, received: bool) -> None:
+        stamp_ns = frame.monotonic_ns or time.monotonic_ns()
+        self.recorder.frame(changed(frame, monotonic_ns=stamp_ns, received=received))

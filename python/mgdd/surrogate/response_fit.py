@@ -176,7 +176,7 @@ def fit_response(
 
 
 def _draw(fit: ResponseFit, ax: Any) -> Any:
-    from mgdd.plot.response import response_diagnostics
+    from mgdd.plot.identification import response_diagnostics
 
     return response_diagnostics(fit.diagnostics, ax=ax)
 

@@ -1,7 +1,5 @@
 """The command line: JSON alone on stdout, options named after parameters, exit codes, messages."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """`mgdd engine analyze`: window, smoothing, brake work, and files of several cycles."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +84,7 @@ def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: Capsys) -> 
     assert main(["engine", "analyze", str(file), "--preset", "puma_single"]) == 0
     (line,) = (row for row in capsys.readouterr().out.splitlines() if row.startswith("ca50_cad"))
     shown = [float(word) for word in line.split()[1:3]]  # mean and standard deviation, side by side
-    assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-4)
+    assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-3)
 
 
 def test_ringing_of_a_record_and_the_share_of_its_cycles_that_knock(tmp_path: Path, capsys: Capsys) -> None:

@@ -1,7 +1,5 @@
 """`mgdd engine analyze` of several files, and their page: what it holds, and when nothing is written."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

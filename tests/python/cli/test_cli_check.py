@@ -1,7 +1,5 @@
 """`mgdd engine check`, and the forms of pressure files on the command line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`mgdd data`: what a file holds, the file as another that reads back equal, and public data as files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`mgdd throttle export`: what the library writes, from the numbers of a tuner on a throttle of another friction."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is typed as first guessed: it is a command, or one line says what to type; and how little is loaded for it."""
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Options that come from the library: names, kinds, choices, defaults and help of its signatures and numpydoc."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import inspect

@@ -1,7 +1,5 @@
 """`mgdd map`: the chain from a design to a DCM file, each step against the Python interface called directly."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -119,21 +117,6 @@ def test_optimum_and_smooth_map_are_those_of_the_library(chain: Path) -> None:
         assert read_map(chain / "smooth.nc") == smooth
         assert "p_max_bar" in best.cells["active_limit"]  # the limit acts
         assert float(apply_map(smooth, table)["loss"].max()) <= 0.002
-
-
-def test_the_optimum_is_near_that_of_the_model_itself(chain: Path) -> None:
-    """The chain by way of fitted models costs little against the optimum by the cycle model on the same grid."""
-    preset = presets.load("puma_single")
-    axes = {
-        "speed_rpm": [1200.0, 1700.0, 2600.0],
-        "fuel_mg": np.linspace(10, 26, 4),
-        "soc_cad": np.linspace(-12, 2, 29),
-    }
-    truth = sweep(preset.cylinder, preset.point, axes, outputs=RESPONSES)
-    best = optimize_map(truth, "efficiency_gross", limits={"p_max_bar": 105.0})
-    at = apply_map(read_map(chain / "best.nc"), truth)
-    assert float(np.abs(best.cells["objective"] - at["efficiency_gross"]).max()) < 0.004
-    assert float(at["p_max_bar"].max()) < 107.0
 
 
 def test_nothing_lies_beside_the_files(chain: Path) -> None:

@@ -1,7 +1,5 @@
 """`mgdd map`: what is refused names field, value and remedy, in the words of the options, and writes nothing."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

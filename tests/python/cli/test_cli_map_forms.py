@@ -1,7 +1,5 @@
 """`mgdd map show | diff | export` on maps of known content: axes in any order, file forms, measured engines."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

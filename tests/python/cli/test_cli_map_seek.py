@@ -1,7 +1,5 @@
 """`mgdd map seek`: Ctrl-C and a record, several inputs, and what is wrong with an option."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

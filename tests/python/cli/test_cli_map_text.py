@@ -1,7 +1,5 @@
 """`mgdd map` in a terminal: what stands in the table of a map, and that a wide one is cut into parts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`mgdd map trade-off`: lines in closed form, where a map stands on them, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`mgdd map design --within`: new points stay between those that were driven."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

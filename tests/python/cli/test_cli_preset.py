@@ -1,7 +1,5 @@
 """`mgdd preset` and `mgdd completion`: shipped presets from the command line, and a shell that completes."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import subprocess

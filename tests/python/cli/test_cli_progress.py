@@ -1,7 +1,5 @@
 """What the command line says while it works and when it fails, and the keys of its JSON."""
 
-from __future__ import annotations
-
 import io
 import json
 import logging

@@ -1,7 +1,5 @@
 """`mgdd rig` from the shell: hub, node, run, check, record, export, in a terminal, as text and as JSON."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

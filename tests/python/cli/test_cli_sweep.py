@@ -1,7 +1,5 @@
 """`mgdd engine sweep`: the table of the library in a file, and its figures beside it."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

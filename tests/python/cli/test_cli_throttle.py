@@ -1,7 +1,5 @@
 """`mgdd throttle excite | identify | validate`: the library's results, files that go round, refusals."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The bench of several inputs from Python: steps, maps, optimum under limits, loops, refusals."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import pickle

@@ -1,7 +1,5 @@
 """A controller as C++: every number arrives, a host gives the same bits, a Cortex-M but for exp and tanh."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Callable, Sequence

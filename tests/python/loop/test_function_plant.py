@@ -1,7 +1,5 @@
 """A compiled function as a plant: the bits of the same function in Python, in loops of the core."""
 
-from __future__ import annotations
-
 import copy
 import ctypes
 import math

@@ -1,7 +1,5 @@
 """Inputs that can be set in whole steps alone: what is asked lies on them, the best is found, limits are kept."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

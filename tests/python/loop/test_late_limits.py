@@ -1,7 +1,5 @@
 """Limits that come late: on the engine bench, in files, pickles and histories."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

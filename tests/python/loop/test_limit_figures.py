@@ -1,7 +1,5 @@
 """What a run says of its limits: from the first cycle on, without a margin, measured and noise-free apart."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """The virtual bench and the simulated rig from Python: labels, chunking, state, threads, errors."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

@@ -1,7 +1,5 @@
 """Closed loops from Python: the same run in one piece, in pieces, cycle by cycle; whole loops at once."""
 
-from __future__ import annotations
-
 import math
 import os
 import signal

@@ -1,7 +1,5 @@
 """No cell of a map is left alone for ever: engines of a few lines, without a guide."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """One model through the chain: a fit, its model, its file or a plant of one's own where a throttle is meant."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

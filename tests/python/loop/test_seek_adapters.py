@@ -1,7 +1,5 @@
 """The adapters of the page "How to" to Gymnasium and cernml, as they stand there."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

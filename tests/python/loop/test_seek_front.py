@@ -1,7 +1,5 @@
 """Two objectives: the front that is found beside one that is known in closed form, or from a steady map."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

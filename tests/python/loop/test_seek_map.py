@@ -1,7 +1,5 @@
 """A search for a map, on a spark engine of its own: other physics, other signs and names than the package's engine."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import itertools

@@ -1,7 +1,5 @@
 """One call of `seek`: which seeker it takes, what it returns, what it doubts, and what it refuses."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

@@ -1,7 +1,5 @@
 """One question, three doors: `seek`, `mgdd engine seek` and ``task = "seek"`` give the same bits."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A run that swings says so: by its own crossings, whatever the controller and the plant, and no other run does."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

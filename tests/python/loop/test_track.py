@@ -1,7 +1,5 @@
 """Controllers along a reference: figures, own controllers, warm starts, tuning, the command line, refusals."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

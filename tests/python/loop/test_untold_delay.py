@@ -1,7 +1,5 @@
 """A loop whose delay is longer than it was stated, on throttles that share no code with the package."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

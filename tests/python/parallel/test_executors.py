@@ -1,7 +1,5 @@
 """Whatever executor runs the parts: the same bits, and what is left when it is stopped."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

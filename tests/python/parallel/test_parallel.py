@@ -1,7 +1,5 @@
 """The one mechanism of executors: order, lost workers, errors, Ctrl-C, and what cannot be pickled."""
 
-from __future__ import annotations
-
 import multiprocessing
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Figures by structure: units on the axes, the Dataset's own numbers on the lines, given axes respected."""
 
-from __future__ import annotations
-
 import itertools
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Figures of maps: the Dataset's own numbers, gaps left white, marks of the cells, what is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

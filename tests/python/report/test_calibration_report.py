@@ -1,7 +1,5 @@
 """The page of a calibration: of the user's own files, and of the demo; Ctrl-C keeps what is finished."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

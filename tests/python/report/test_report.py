@@ -1,7 +1,5 @@
 """A report as a page: complete, self-contained, escaped."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

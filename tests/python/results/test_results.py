@@ -1,7 +1,5 @@
 """Labelled Datasets: nothing without a unit, and JSON that any reader takes."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

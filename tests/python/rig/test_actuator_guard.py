@@ -1,7 +1,5 @@
 """The guard between an optimiser and the actuators: what it rejects, what it applies instead, and what it says."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

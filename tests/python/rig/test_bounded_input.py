@@ -1,7 +1,5 @@
 """What a file carries is bounded where it enters: every reader meets what no bench writes, and refuses it in short."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pkgutil

@@ -3,8 +3,6 @@
 No test here asserts how late anything is: a busy machine may be late, and must count it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Trouble of a bus below the real-time loop, and every way in which a loop ends."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -1,7 +1,5 @@
 """A rig over a bus: modes, who is there, arming and leaving."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math

@@ -1,7 +1,5 @@
 """A rig behind the DBC of a user: driven in this process and another, or its map is told which names are needed."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

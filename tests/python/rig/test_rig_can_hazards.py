@@ -1,7 +1,5 @@
 """The safety gate in the node: it acts by itself, and never before the gate of a healthy host."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

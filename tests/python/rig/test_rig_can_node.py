@@ -1,7 +1,5 @@
 """A node behind a bus trusts nobody: frames and time by hand."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import time

@@ -1,7 +1,5 @@
 """One contract for every rig, whatever stands behind it: in this process, recorded, over a bus."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Iterator

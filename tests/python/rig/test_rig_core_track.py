@@ -1,7 +1,5 @@
 """Tracking over a bus on the real-time loop of the core: its messages, its record and replay, and how it ends."""
 
-from __future__ import annotations
-
 import json
 import time
 import tracemalloc

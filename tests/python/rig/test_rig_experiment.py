@@ -1,7 +1,5 @@
 """Experiments from a file: what the file may hold, runs in process, the folder of a run, and what a kill leaves."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

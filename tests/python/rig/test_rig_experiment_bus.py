@@ -1,7 +1,5 @@
 """Experiments over a bus: the in-process result within the noise, replay bit for bit, dry run, check, self-test."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

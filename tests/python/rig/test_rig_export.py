@@ -1,7 +1,5 @@
 """A record in the formats of other tools, read back by those tools."""
 
-from __future__ import annotations
-
 import csv
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Real processes that are stopped and go on: nothing that waited meanwhile may move the plate."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import os

@@ -1,7 +1,5 @@
 """A loop with a socket of its own: what the rig hears, records and refuses; the socket itself in tests/uml."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +9,12 @@ import pytest
 
 from mgdd.errors import RigError
 from mgdd.rig import Recorder, SignalMap, read_record
-from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.signal_map import loop_messages
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment import core_track
 from mgdd.rig.experiment.core_track import SocketBus, WatchedBus
 from mgdd.rig.realtime import Frame
+from mgdd.rig.recorder import RecordedBus
 from realtime_loops import becomes
 
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")

@@ -1,7 +1,5 @@
 """Bytes of a bus that are not a frame, and our own frames that come back: left out and counted."""
 
-from __future__ import annotations
-
 import math
 import socket
 import threading

@@ -1,7 +1,5 @@
 """``task = "map"`` of an experiment: what is told belongs to its point, and a record gives the same map again."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Two processes and a hub: the same bits as in one process, and how a node starts and ends."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -1,7 +1,5 @@
 """The record of a run: what comes back and is refused, what a kill, a full disk and damage leave, and its repair."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Every hazard of a rig on the virtual throttle: bridge open in time, reason named, no way back but the operator."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

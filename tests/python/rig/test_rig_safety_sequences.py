@@ -1,7 +1,5 @@
 """Random faults and requests on the safety gate: no actuator is driven outside run, no fault ends by itself."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from typing import Any

@@ -1,7 +1,5 @@
 """A seeker on a rig: the loop of the core bit for bit, restarts, misfires, interruption and errors."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Mapping
 from typing import Any, Self

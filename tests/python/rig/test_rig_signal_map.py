@@ -1,7 +1,5 @@
 """DBC and signal map: what is shipped, a layout of somebody else, and what is refused before anything is sent."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The transport: every way to open, lose and close a bus, and the faults of a hub."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import socket
@@ -16,8 +14,7 @@ import pytest
 from hub_thread import bus_of, running_hub
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
-from mgdd.rig.can.hub import Hub
-from mgdd.rig.can.hub_faults import BusFault
+from mgdd.rig.can.hub import BusFault, Hub
 from mgdd.rig.can.python_can import STILL_S, Reception
 from mgdd.rig.can.transport import CanTransport
 

@@ -1,7 +1,5 @@
 """Real SocketCAN: User-Mode Linux boots with vcan and runs tests/uml there, as an ordinary user on a read-only root."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re

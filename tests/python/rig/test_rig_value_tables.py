@@ -1,7 +1,5 @@
 """What a DBC says beside its signals: raw values that are no measurement, and messages that cannot be mapped."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The live page: what it reads, what it refuses, and what its stop button does, in a real browser too."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -7,8 +7,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from mgdd.rig.can.hub import Hub
-from mgdd.rig.can.hub_faults import BusFault
+from mgdd.rig.can.hub import BusFault, Hub
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from scipy.stats import t
 from mgdd.design import design_points
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.plot.response import response_diagnostics
+from mgdd.plot.identification import response_diagnostics
 from mgdd.results import Fit
 from mgdd.results.labels import check_labels
 from mgdd.surrogate import ResponseModel, fit_response

@@ -1,7 +1,5 @@
 """A throttle in python-control: the same response as our own simulation, alone and in a loop."""
 
-from __future__ import annotations
-
 import builtins
 from typing import Any
 

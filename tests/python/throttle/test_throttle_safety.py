@@ -1,7 +1,5 @@
 """Faults of a throttle in the loop under its supervisor: safe in time, for the right reason, until it is told."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

@@ -14,7 +14,7 @@ from typing import IO, Any, Self
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Plant, ThrottleFault, VirtualEngine, VirtualThrottle
-from mgdd.rig.can.hub_faults import fault_of
+from mgdd.rig.can.hub import fault_of
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import Bus, changed

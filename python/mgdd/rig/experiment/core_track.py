@@ -17,7 +17,6 @@ from mgdd.errors import RigError
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import held_back
-from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.signal_map import SignalMap, loop_messages
 from mgdd.rig.can.transport import Bus, changed, two_senders
 from mgdd.rig.experiment.checked import CheckedExperiment
@@ -26,6 +25,7 @@ from mgdd.rig.experiment.stand import Cycle, RunRecord
 from mgdd.rig.experiment.tasks import Outcome, TrackPlan
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
+from mgdd.rig.recorder import RecordedBus
 from mgdd.rig.safety import drive_taken, said_of
 
 _ALL_BITS = {False: 0x7FF, True: 0x1FFF_FFFF}

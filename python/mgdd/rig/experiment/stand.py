@@ -19,13 +19,12 @@ from mgdd.optimize import Limit
 from mgdd.rig.base import ActuatorGuard, AroundPlant, SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
-from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import Bus, CanTransport
 from mgdd.rig.exchange import TABLE, RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
 from mgdd.rig.experiment.engine_tasks import MapPlan, SeekPlan
 from mgdd.rig.experiment.tasks import compared
-from mgdd.rig.recorder import Recorder
+from mgdd.rig.recorder import RecordedBus, Recorder
 from mgdd.rig.safety import GatedThrottle, SafetyGate, said_of
 
 
