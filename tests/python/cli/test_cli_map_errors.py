@@ -38,7 +38,6 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_map(timing_table(), tmp_path / "holes.nc")
     write_map(CalibrationMap({"fuel_mg": [6.0, 40.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "rail.nc")
     write_map(CalibrationMap({"fuel_mg": [60.0, 80.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "far.nc")
-    (tmp_path / "told.json").write_text("{}")
     (tmp_path / "bench.csv").write_text(BENCH)
     columns = dict(
         zip(
@@ -80,30 +79,20 @@ design RANGES --points 4 --limit p_max_bar=high -o plan.csv -> --limit p_max_bar
 design RANGES --points 4 --limit p_max_ba=9 -o plan.csv -> --limit = 'p_max_ba': must be a known name
 design RANGES --points 4 --extend design.csv -o plan.csv -> --extend: fuel_mg = 50 of point 1: must be in [6, 40]
 design RANGES --points 4 --extend designs.csv -o plan.csv -> did you mean 'design.csv'
-design RANGES --points 4 --extend p_max.toml -o plan.csv -> points are read from .csv and .nc
 design --over fuel_mg=0:60 --points 4 --extend design.csv -o design.csv -> the file of --extend; new points
 design RANGES --points 4 -o plan.xlsx -> the ending must be one of .csv, .nc, .json
-design RANGES --points 4 -o no/plan.csv -> the folder no does not exist
-fit bench.csv FACTORS -> the following arguments are required: --response
 fit bench.csv P_MAX -> --factors is needed: which columns of bench.csv make p_max_bar
 fit bench.csv --response p_max FACTORS -> bench.csv: no column 'p_max': did you mean 'p_max_bar'?
 fit bench.csv P_MAX --factors p_max_bar,fuel_mg -> each name once, without the response p_max_bar
 fit bench.csv P_MAX --factors fuel_mg, -> --factors fuel_mg,: each name once
 fit bench.csv --response flat_k FACTORS -> flat_k is 300 at every point: nothing to fit
 fit bench.csv P_MAX FACTORS --delimiter ; -> no column 'speed_rpm'
-fit bench.cvs P_MAX FACTORS -> points are read from .csv and .nc
-fit table.nc --response p_max -> table.nc: no column 'p_max': did you mean 'p_max_bar'?
 fit bench.csv P_MAX FACTORS --figure fit.gif -> --figure fit.gif: the ending must be one of
-fit bench.csv P_MAX FACTORS -o fit.csv -> -o fit.csv: the ending must be one of .toml, .json
 predict p_max.toml -> one of the arguments --over --points is required
 predict p_max.toml --over speed_rpm=1000:2000:3 -> --over fuel_mg=LOW:HIGH:N is missing: the models need
 predict p_max.toml GRID --over soc_cad=0:1:2 -> --over soc_cad: not a factor of the models: they have
 predict p_max.toml p_max.toml GRID -> two files hold a model of p_max_bar: give one of each response
 predict bench.csv GRID -> bench.csv: a model ends in .toml, as mgdd map fit -o model.toml writes it
-predict p_min.toml GRID -> did you mean 'p_max.toml'?
-predict p_max.toml GRID -o table.xls -> -o table.xls: the ending must be one of .nc, .csv
-predict p_max.toml --points p_max.toml -> points are read from .csv and .nc
-optimize table.nc -> one of the arguments --maximize --minimize is required
 optimize table.nc BEST --minimize p_max_bar -> not allowed with argument
 optimize table.nc --maximize efficiency -> did you mean 'efficiency_gross'?
 optimize table.nc BEST --along soi_cad -> name the swept input with --along
@@ -113,8 +102,6 @@ optimize table.nc BEST --limit p_max_bar=60 => or pass --infeasible 'keep'
 optimize table.nc BEST --limit p_max_bar=10 => no soc_cad keeps the limits in any cell
 optimize table.nc BEST --sd nox_ppm=1 -> 'nox_ppm' is neither the objective nor limited
 optimize bench.csv BEST -> a map is made of a table over a grid, which a CSV file does not keep: write it as netCDF
-optimize tables.nc BEST -> did you mean 'table.nc'?
-optimize table.nc BEST -o best.toml -> the ending must be one of .nc, .csv, .dcm, .cdfx
 optimize table.nc BEST --limit p_max_bar=110 --infeasible keep -o b.dcm -> smooth the map with --fill
 smooth best.nc --slope-limit fuel_mg -o smooth.nc -> --slope-limit fuel_mg: write NAME=NUMBER
 smooth best.nc --slope-limit speed=1 -o smooth.nc -> slope_limits: no axis 'speed': did you mean 'speed_rpm'?
@@ -122,7 +109,6 @@ smooth best.nc --slope-limit fuel_mg=1e-4 -o smooth.nc => widen the ranges: a la
 smooth rail.nc -o smooth.nc -> an optimum with --max-loss has one
 smooth best.jsn -o smooth.nc -> no such file: did you mean 'best.nc'?
 smooth p_max.toml -o smooth.nc -> give such an ending
-smooth tables.json -o smooth.nc -> no such file
 show best.nc --contour -> --contour does not act here; it is a form of the picture
 show best.nc --contour --figure a.png --column source -> contradict each other
 show best.nc --column lowest -> --column lowest: the map has value, support, sd, low
@@ -130,19 +116,16 @@ show best.nc --name soi_cad -> best.nc: no variable 'soi_cad' over one or two ax
 show table.nc -> of a sweep make a map first, with optimize_map or mgdd map optimize
 show rail.nc --sweep table.nc -> it does not belong to this map
 show p_max.toml -> a map is written to and read from .nc, .csv, .dcm, .cdfx
-show told.json -> a map is written to and read from .nc, .csv
 diff rail.nc far.nc -> have nothing in common: pass --grid 'first'
 diff best.nc holes.nc -o diff.csv -> the ending must be one of .nc, .json
 export best.nc -> -o is needed: name the file to write
 export -o a.nc -> no map: name a file, or a measured engine with --advisor
-export best.nc -o a.toml -> the ending must be one of .nc, .csv, .dcm, .cdfx
 export best.nc rail.nc -o a.nc -> 2 maps fit into a .dcm or .cdfx only
 export best.nc --label A -o a.nc -> --label does not act here; only a .dcm or .cdfx file
 export best.nc --label A --label B -o a.dcm -> 2 for 1 maps: give one per map
 export rail.nc far.nc -o a.dcm -> two maps would be called 'rail_bar' in a.dcm
 export holes.nc -o a.dcm -> a DCM file needs all: smooth the map with --fill
 export best.nc --advisor mercedes -o a.csv -> --advisor and best.nc contradict
-export --advisor opel -o a.csv -> invalid choice: 'opel'
 """
 
 

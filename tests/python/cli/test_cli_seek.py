@@ -105,8 +105,8 @@ WRONG = """
 --start -8 | --start soc_cad=-8 -> NAME=
 --input soc_cad=-61:5 | --input soc_cad=-60:5 -> --input soc_cad=-61:5: -61 must be in [-60, 20], the window of the
 --input soc_cad=5:-25 | --input soc-cad=-25:5 -> LOW and HIGH must be finite and LOW < HIGH
---input soc_cad=-25:5:31 | --input soc_cad=-25:5:2 -> STEP must be > 0 and at most HIGH - LOW
 --input soc_cad | --input soc_cad=-25:5 -> --input soc_cad: write NAME=LOW:HIGH
+--input soc_cad=-25:5:31 | --input soc_cad=-25:5:2 -> STEP must be > 0 and at most HIGH - LOW
 --input boost=0:9 | --input soc_cad=-25:5 -> --input boost: the bench has soc_cad, intake_
 --input soc=-25:5 | --input soc_cad=-25:5 -> did you mean 'soc_cad'?
 --input soc_cad=-25:5 --input soc_cad=-20:5 | --input soc_cad=-25:5 -> --input soc_cad is given twice
@@ -117,10 +117,8 @@ WRONG = """
 --noise -1 | --noise 0 -> --noise -1 %: must be in [0, 20]
 --soc-scatter-cad 6 | --soc-scatter-cad 5 -> --soc-scatter-cad 6 °CA: must be in [0, 5]
 --limit p_maxx=95 | --limit p_max_bar=95 -> --limit 'p_maxx' is not measured: must be one of
---limit p_max_bar | --limit p_max_bar=95 -> write NAME=X
 --limit p_max_bar=99:9 | --limit p_max_bar=9:99 -> --limit p_max_bar=99:9: write NAME=X, or
 --limit p_max_bar=300: | --limit p_max_bar=:110 => keeps p_max_bar >= 300: move a limit
---start soc_cad=50 | --start soc_cad=5 -> --start: soc_cad = 50: must be in [-30, 10]
 --tolerance egr=1 | --tolerance soc_cad=1 -> --tolerance has egr: must have one number for
 --seeker-set memory_cycles=x | -> --seeker-set: memory_cycles = 'x': must be
 --seeker-set limits=3 | -> --seeker-set: 'limits' is not one of them: the search gives it
@@ -131,9 +129,6 @@ WRONG = """
 --sensor analyser --seeker spsa | --seeker spsa -> --seeker spsa: takes J of the same cycle
 --sensor analyser --seeker golden_section --noise-sd 0.25 | --seeker golden_section --noise-sd 0.25 -> extremum_seeking
 --motored | -> leave --motored out
---preset nonesuch | --preset puma_single -> nonesuch
---set bore_mm=-1 | --set bore_mm=80 -> bore_mm = -1
--o run.txt | -> -o run.txt: the ending
 """
 
 

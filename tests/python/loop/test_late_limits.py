@@ -1,11 +1,8 @@
 """Limits that come late: on the engine bench, in files, pickles and histories."""
 
-import copy
 import math
-import pickle
 from collections import deque
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +15,6 @@ from mgdd.optimize import (
     ExtremumSeeking,
     GaussianProcessSeeking,
     Limit,
-    Seeker,
 )
 from mgdd.results.labels import check_labels
 
@@ -73,16 +69,6 @@ def test_a_peak_pressure_ten_cycles_late_is_truly_kept(name: str) -> None:
         applied.append(run.summary["mean_applied_soc_cad"])
     assert np.mean(above) <= 0.01, above
     assert 0.0 < np.mean(applied) - best < 2.0, applied
-
-
-def test_a_limit_is_the_same_after_every_journey(tmp_path: Path) -> None:
-    limit = Limit("p_max_bar", 95.0, margin=1.5, scale=7.0, delay_cycles=10.5, lag_cycles=2.0, margin_sd=0.25)
-    assert (limit.delay_cycles, limit.lag_cycles, limit.margin_sd) == (10.5, 2.0, 0.25)
-    assert limit != Limit("p_max_bar", 95.0, margin=1.5, scale=7.0, delay_cycles=10.5, lag_cycles=2.0, margin_sd=0.5)
-    assert eval(repr(limit)) == limit
-    assert pickle.loads(pickle.dumps(limit)) == copy.copy(limit) == limit
-    seekers(limit, 1)["ExtremumSeeking batch"]().save(tmp_path / "seeker.json")
-    assert Seeker.load(tmp_path / "seeker.json").settings["limits"] == [limit]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
-from tests.python.support.stepped import stepped
 
 from mgdd.engine import OperatingPoint
 from mgdd.errors import Interrupted, ParameterError
@@ -129,22 +128,6 @@ def test_noise_free_is_the_same_bench_without_scatter_and_noise() -> None:
         bench.noise_free_limits([0.0], [-1])
 
 
-def test_a_timing_exactly_at_the_limit_is_above_it_in_half_of_the_cycles() -> None:
-    """The pressure falls with the timing, so a symmetric scatter of the timing carries half of the cycles over."""
-    bench, soc = VirtualEngine(limits=["p_max_bar"], seed=2), np.full(4000, -3.0)
-    free = bench.noise_free_limits(soc, np.arange(4000))
-    dataset = bench.run(soc)
-    over = (("cycle", "input"), soc[:, np.newaxis])
-    dataset = dataset.assign(input=("input", ["soc_cad"]), estimate=over, applied=over)
-    dataset["noise_free_limits"] = dataset["limits"].copy(data=free)
-    summary = summarize_cycles(dataset, LoopCriteria(limits={"p_max_bar": float(free[0, 0])}))
-    four_sigma = 4.0 * math.sqrt(0.25 / 4000)
-    assert summary["above_fraction_p_max_bar"] == pytest.approx(0.5, abs=four_sigma)
-    assert summary["judged_above_fraction_p_max_bar"] == pytest.approx(0.5, abs=four_sigma * math.sqrt(4 / 3))
-    assert summary["noise_free_above_cycles_p_max_bar"] == 0.0
-    assert summary["noise_free_worst_p_max_bar"] == summary["limit_p_max_bar"] < summary["worst_p_max_bar"]
-
-
 def test_the_surrogate_knows_its_surfaces_and_the_throttle_has_no_limits() -> None:
     surrogate = fit_surrogate(random_step_records(1500))
     run = run_seeker(SurrogatePlant(surrogate, limits=["mprr"], seed=4), seeker(mprr=5.0), 60)
@@ -185,19 +168,6 @@ def test_a_run_that_ends_before_its_first_cycle_is_interrupted_and_nothing_else(
     run = stop.value.partial
     assert (run.interrupted, run.dataset.sizes["cycle"], run.summary["judged_from"]) == (True, 0, 0.0)
     assert np.isnan(run.summary["final_soc_cad"])
-
-
-def test_p_max_is_kept_by_every_seeker_within_1_7_degrees_of_the_limit() -> None:
-    """All but the slow process and the curve, whose own tests hold them to limits."""
-    bench = VirtualEngine(limits=["p_max_bar"])
-    best = bench.find_optimum({"p_max_bar": 95.0})
-    made = stepped(**SPACE, limits=[Limit("p_max_bar", 95.0)])
-    chosen = [make() for name, make in made.items() if name not in ("GaussianProcessSeeking", "CurveSeeking")]
-    above = LoopCriteria(exceed_above={"p_max_bar": 95.0 + 3.0 * best["scatter_p_max_bar"]})
-    table = monte_carlo(bench, chosen, SEEDS, cycles=3000, criteria=above).isel(bench=0)
-    assert float(table["exceeded_fraction"].max()) < 0.01
-    away = table["mean_applied_soc_cad"] - best["soc_cad"]  # of cycles 1500 to 3000
-    assert float(abs(away).max()) < 1.7  # dither, and one standard deviation of the scatter
 
 
 def test_the_seeker_returns_below_the_limit_after_a_load_step() -> None:

@@ -171,11 +171,3 @@ def test_a_refused_call_changes_nothing() -> None:
     twin = VirtualEngine(**RICH)
     twin.run(requests(20))
     assert bench.step(-6.0)["j"] == twin.step(-6.0)["j"]
-
-
-def test_the_request_array_is_left_alone() -> None:
-    soc = np.array([-100.0, -6.0])
-    out = VirtualEngine(**QUIET).run(soc)
-    np.testing.assert_array_equal(soc, [-100.0, -6.0])
-    np.testing.assert_array_equal(out["clamped"], [True, False])
-    assert float(out["soc_cad"][0]) == -60.0

@@ -64,20 +64,6 @@ def test_one_run_is_its_pieces_is_ask_and_tell(kind: str) -> None:
     np.testing.assert_array_equal(single.history["applied"].values[:, 0], whole.dataset["asked"][:, 0])
 
 
-def test_labels_and_history_of_a_run() -> None:
-    it = seeker("batch")
-    run = run_seeker(
-        bench(), it, 200, criteria=LoopCriteria(optimum=-2.0, exceed_above={"p_max_bar": 110.0}, exceed_from=100)
-    )
-    check_labels(run.dataset)
-    assert run.dataset.sizes["cycle"] == 200
-    assert not run.interrupted
-    over = (run.dataset["limits"].sel(limit="p_max_bar")[100:] > 110.0).mean()
-    assert run.summary["exceeded_fraction"] == pytest.approx(float(over), abs=1e-12)
-    assert run.summary["final_soc_cad"] == pytest.approx(float(run.dataset["estimate"][100:, 0].mean()), abs=1e-12)
-    np.testing.assert_array_equal(it.history["applied"].values[:, 0], run.dataset["asked"][:, 0])
-
-
 def test_limits_are_judged_in_short_runs_too() -> None:
     goal = LoopCriteria(exceed_above={"p_max_bar": 110.0})
     for cycles in (1, 7, 200):
@@ -154,12 +140,6 @@ def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:
     assert limited["soc_cad"] == pytest.approx(model["soc_cad"], abs=0.002)
     scattered = VirtualEngine(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited["soc_cad"]))
     assert float(scattered["p_max_bar"].std()) == pytest.approx(limited["scatter_p_max_bar"], rel=0.05)
-
-
-@pytest.mark.parametrize(("weight", "soc"), [(0.0, -5.63), (0.002, -2.72), (0.004, -0.65), (0.008, 2.36)])
-def test_the_optimum_moves_late_with_the_weight_of_nox(weight: float, soc: float) -> None:
-    plant = VirtualEngine(performance=Performance.efficiency_and_nox(weight), nox_sensor="true_value")
-    assert plant.find_optimum()["soc_cad"] == pytest.approx(soc, abs=0.03)
 
 
 def test_steady_map_is_quiet_and_labelled() -> None:

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from independent_throttle import FAMILIES
-from mgdd.control import GuidedPredictive, SupervisedController
+from mgdd.control import GuidedPredictive
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.loop import Reference, track, tuned_controller
 from throttle_bodies import BodyPlate, draw_body, known_of
@@ -37,32 +36,7 @@ def test_a_delay_that_was_not_stated_is_found_in_the_first_step(family: str, lat
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_without_the_search_it_swings_and_with_the_true_delay_the_search_changes_nothing(family: str) -> None:
+def test_without_the_search_it_swings(family: str) -> None:
     blind, plate, delay = _controller(family, delay_search_samples=0)
     run = track(blind, _REFERENCE, throttle=plate, delay_samples=delay + 5, noise_deg=0.03, seed=4)
     assert "the plate swings by" in str(run.attrs["findings"])
-    duties = []
-    for settings in ({}, {"delay_search_samples": 0}):
-        controller, plate, delay = _controller(family, **settings)
-        duties.append(track(controller, _REFERENCE, throttle=plate, delay_samples=delay, seed=4)["duty"].to_numpy())
-    np.testing.assert_array_equal(duties[0], duties[1])
-
-
-@pytest.mark.parametrize("kind", ["guided", "pid", "sliding_mode"])
-def test_the_supervisor_opens_the_bridge_of_a_loop_that_swings(kind: str) -> None:
-    body = replace(draw_body("lugre", 5), delay_samples=1)
-    model = FirstPrincipleModel(parameters=known_of(body, 3), closed_deg=body.closed_deg, open_deg=body.open_deg)
-    made = tuned_controller(kind, model)
-    if isinstance(made, GuidedPredictive):
-        made = GuidedPredictive(**(made.settings | {"delay_search_samples": 0}))
-    loop = SupervisedController(made)
-    plate, waiting = BodyPlate(body, 30.0), [0.0] * 9
-    reasons = []
-    for k in range(1500):
-        angle = plate.output
-        inputs = loop.step(30.0 if k < 100 else 45.0, {"first_angle_deg": angle, "second_angle_deg": angle})
-        waiting.append(inputs["duty"])
-        plate.step(waiting.pop(0))
-        reasons.append(loop.supervisor.reason)
-    assert (loop.supervisor.mode, loop.supervisor.reason) == ("limp_home", "oscillation")
-    assert set(reasons) == {"none", "oscillation"}

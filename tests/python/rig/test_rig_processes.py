@@ -9,54 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mgdd.control import Pid
 from mgdd.errors import RigError
-from mgdd.loop import Measurement, Reference, VirtualEngine, VirtualThrottle, run_seeker
+from mgdd.loop import Measurement, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.rig import CanRig, VirtualNode
-from mgdd.rig.base import Rig
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")
-
-
-def on_grid(values: np.ndarray | float, scale: float, offset: float = 0.0) -> np.ndarray:
-    """What a signal makes of a value."""
-    return np.round((np.asarray(values) - offset) / scale) * scale + offset
-
-
-def plant(sample_s: float = 5e-3) -> VirtualThrottle:
-    return VirtualThrottle(inputs=["duty", "bridge_open"], sample_s=sample_s, seed=7)
-
-
-def follow(rig: Rig, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
-    """A controller along a reference on any rig."""
-    controller, measured = Pid(), 8.0
-    duties, angles = [], []
-    for wanted in reference.angle_deg:
-        duties.append(controller.step(float(wanted), measured))
-        rig.apply({"duty": duties[-1]})
-        measured = rig.measure().values["sensed_angle_deg"]
-        angles.append(measured)
-    return np.array(duties), np.array(angles)
-
-
-@pytest.mark.slow
-def test_tracking_over_the_bus_is_that_of_one_process() -> None:
-    reference = Reference(angle_deg=np.r_[np.full(150, 20.0), np.full(150, 40.0)])
-    own, controller, measured = plant(1e-3), Pid(), 8.0
-    angles = []
-    for wanted in reference.angle_deg:
-        duty = controller.step(float(wanted), measured)
-        own.apply({"duty": float(on_grid(duty, 0.0005)), "bridge_open": 0.0})
-        measured = float(on_grid(own.measure().values["sensed_angle_deg"], 0.01, -20.0))
-        angles.append(measured)
-    node = VirtualNode("etb", step=True, seed=7, sample_ms=1.0)
-    with node, CanRig("etb", node.bus, mode="hil", timeout_s=20.0) as rig:
-        duties, over_the_bus = follow(rig, reference)
-    np.testing.assert_array_equal(over_the_bus, angles)
-    assert duties[-1] == duty
-    assert abs(over_the_bus[-30:].mean() - 40.0) < 1.0
 
 
 @pytest.mark.slow

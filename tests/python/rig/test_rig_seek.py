@@ -12,7 +12,6 @@ from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import LoopCriteria, Measurement, VirtualEngine, run_seeker
 from mgdd.loop.plant import AnnouncingPlant
-from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,
@@ -186,15 +185,6 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
     assert own.cycle == 7
     assert own.history.sizes["cycle"] == 7
     assert run_seeker(ScriptedRig(hill), own, 300).summary["final_soc_cad"] == pytest.approx(-5.6, abs=0.1)
-
-
-def test_summary_of_half_a_run() -> None:
-    run = run_seeker(VirtualEngine(seed=2), seeker(), 500, criteria=LoopCriteria(optimum=-5.63))
-    part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), LoopCriteria(optimum=-5.63))
-    estimate = run.dataset["estimate"][:, 0].to_numpy()[:250]
-    assert part["final_soc_cad"] == pytest.approx(estimate[150:].mean())
-    assert part["rms_soc_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))
-    assert np.isnan(part["exceeded_fraction"])
 
 
 def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
