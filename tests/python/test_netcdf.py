@@ -235,7 +235,6 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.validate_throttle.n_step": lambda _: validation().n_step,
     "identify.validate_throttle.free_run": lambda _: validation().free_run,
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
-    "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "results.FitReport.dataset": lambda _: report().dataset,
     "results.Fit.dataset": lambda _: fit_groups(log(), delays=[0.0], options=optimize.FitOptions(n_starts=1)).dataset,
     "results.Fit.run": lambda _: fit_groups(log(), delays=[0.0], options=optimize.FitOptions(n_starts=1)).run,

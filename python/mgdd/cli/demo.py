@@ -142,15 +142,10 @@ def _milliseconds(value: float | None) -> str:
 def _span(best: Any, name: str, digits: int) -> str:
     if best["best"] is None:
         return "not known: no plausible model"
-    low, high = best[name]
-    own = best["best"][name]
-    if name.endswith("gain_percent") and undetermined(best[name.replace("gain_percent", "shift_cad")]):
-        return f"open ({low:z.{digits}f} to {high:z.{digits}f})"
-    if name.endswith("shift_cad") and undetermined((low, high)):
-        return f"open ({low:+z.{digits}f} to {high:+z.{digits}f})"
-    if name.endswith("shift_cad"):
-        return f"{own:+z.{digits}f} ({low:+z.{digits}f} to {high:+z.{digits}f})"
-    return f"{own:z.{digits}f} ({low:z.{digits}f} to {high:z.{digits}f})"
+    sign, shift = "+" if name.endswith("shift_cad") else "", name.replace("gain_percent", "shift_cad")
+    low, high, own = (f"{value:{sign}z.{digits}f}" for value in (*best[name], best["best"][name]))
+    is_open = shift.endswith("shift_cad") and undetermined(best[shift])
+    return f"{'open' if is_open else own} ({low} to {high})"
 
 
 COMMANDS = {"demo": (_REPORT.add, run)}

@@ -18,15 +18,12 @@ from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.io.files import write_whole_text
 from mgdd.loop.plates import model_of
 from mgdd.optimize import FitOptions
+from mgdd.plot.identification import validation_figure
 from mgdd.presets.preset import Preset
 from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
-
     from mgdd.identify.throttle.excitation import ExcitationCheck
-    from mgdd.identify.throttle.validation import ThrottleValidation
 
 
 _MODEL = Options(identify.identify_throttle, "model")
@@ -82,7 +79,7 @@ def _identify(args: argparse.Namespace) -> None:
     validation = identify.validate_throttle(fit, log if test is None else test)
     emit(args, {**fit.to_dict(), "validation": validation.to_dict()}, text=f"{fit.summary()}\n\n{validation.summary()}",
          write={".toml": lambda file: write_whole_text(file, fit.to_toml())},
-         figure=lambda: _drawn(validation, fit.report.to_dataset()))  # fmt: skip
+         figure=lambda: validation_figure(validation, fit.report.dataset))  # fmt: skip
     if args.throttle:
         _write_throttle(args, fit.model, known)
     report = fit.report
@@ -130,22 +127,7 @@ def _write_throttle(args: argparse.Namespace, model: Any, known: dict[str, float
 def _validate(args: argparse.Namespace) -> None:
     model = identify.load_throttle_model(args.fit)
     validation = identify.validate_throttle(model, log_in(args, args.file))
-    emit(args, validation.to_dict(), text=validation.summary(), figure=lambda: _drawn(validation, None))
-
-
-def _drawn(validation: ThrottleValidation, correlation: xr.Dataset | None) -> Figure:
-    from matplotlib.figure import Figure
-
-    from mgdd import plot
-
-    rows = 1 if correlation is None else 2
-    figure = Figure(figsize=(12.0, 4.6 * rows), layout="constrained")
-    axes = figure.subplots(rows, 3 if rows == 1 else 2).ravel()
-    for pane, what in zip(axes, ("free_run", "n_step", "residuals"), strict=False):
-        validation.plot(what, ax=pane)
-    if correlation is not None:
-        plot.correlation_matrix(correlation, ax=axes[3])
-    return figure
+    emit(args, validation.to_dict(), text=validation.summary(), figure=lambda: validation_figure(validation))
 
 
 _DESIGN = Options(identify.design_excitation, "side", "duration_s", "sample_s")

@@ -7,13 +7,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, divide, legend, minus, new_axes, require
+from mgdd.plot.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LINE_STYLES,
+    ORANGE,
+    axis_label,
+    divide,
+    legend,
+    minus,
+    new_axes,
+    new_figure,
+    require,
+)
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
     from numpy.typing import NDArray
 
@@ -68,6 +82,18 @@ def residual_correlation(correlations: xr.Dataset | Result, *, ax: Axes | None =
     return ax
 
 
+def validation_figure(validation: Any, correlation: xr.Dataset | None = None) -> Figure:
+    """Draw free run, error ahead and residuals of a validation, and how the estimates of its fit are correlated."""
+    rows = 1 if correlation is None else 2
+    figure = new_figure(12.0, 4.6 * rows)
+    panes = figure.subplots(rows, 3 if rows == 1 else 2).ravel()
+    for pane, what in zip(panes, ("free_run", "n_step", "residuals"), strict=False):
+        validation.plot(what, ax=pane)
+    if correlation is not None:
+        correlation_matrix(correlation, ax=panes[3])
+    return figure
+
+
 def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw how the estimates of a fit depend on each other; pairs beyond 0.98 cannot be separated.
 
@@ -94,7 +120,7 @@ def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = No
     >>> from mgdd import plot
     >>> from mgdd.optimize import least_squares
     >>> fit = least_squares(lambda x: ([x[0] + x[1], x[0]], [[1, 1], [1, 0]]), [1.0, 1.0], names=["preload", "coulomb"])
-    >>> plot.correlation_matrix(fit.to_dataset()).texts[1].get_text()
+    >>> plot.correlation_matrix(fit.dataset).texts[1].get_text()
     '−0.71'
     """
     from matplotlib.patches import Rectangle

@@ -212,25 +212,7 @@ class FitReport(Result):
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The same as `to_dataset` gives."""
-        return self.to_dataset()
-
-    def to_dataset(self) -> xr.Dataset:
-        """Tabulate the estimates and their correlation.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``value``, ``stderr``, ``lower``, ``upper`` and ``bound_active`` over ``parameter``, and ``correlation`` [-]
-            over ``parameter`` and ``other``; NaN for parameters at a bound.
-
-        Examples
-        --------
-        >>> from mgdd.optimize import least_squares
-        >>> report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
-        >>> round(float(report.to_dataset()["correlation"][0, 1]), 3)
-        -0.5
-        """
+        """Estimates over ``parameter``, and their correlation over ``parameter`` and ``other``."""
         names, unit = list(self.names), "unit of the parameter"
         return labelled_dataset(
             {

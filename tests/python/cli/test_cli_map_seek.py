@@ -1,7 +1,6 @@
 """`mgdd map seek`: Ctrl-C and a record, several inputs, and what is wrong with an option."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -23,7 +22,6 @@ AXES = ("--over", "speed_rpm=1200:2400:3", "--over", "fuel_mg=12,28")
 MODEL = ("--guide", "model", "--guide-set", "wall_heat_scale=1.0", "--limit", "p_max_bar=:120", "--averaged", "10:30")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
 def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path: Path, capsys: Capsys) -> None:
     record, whole = tmp_path / "visits.csv", tmp_path / "whole.csv"
     argv = [*AXES, *MODEL, "--record", str(record), "--json", "--quiet"]

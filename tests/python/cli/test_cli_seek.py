@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -149,7 +148,6 @@ def test_help_names_the_default_length(capsys: Capsys) -> None:
     assert "left out: 200, and 25 more per cycle that J is late" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
 def test_ctrl_c_leaves_the_cycles_so_far(tmp_path: Path) -> None:
     ready = tmp_path / "ready"
     program = (

@@ -1,7 +1,6 @@
 """`mgdd engine sweep`: the table of the library in a file, and its figures beside it."""
 
 import json
-import os
 import subprocess
 import sys
 import textwrap
@@ -130,7 +129,6 @@ def test_a_grid_is_csv_with_a_point_per_row(tmp_path: Path) -> None:
 
 
 # --- Ctrl-C -------------------------------------------------------------------------------------------------
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
 @pytest.mark.parametrize("keeps", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_ctrl_c_writes_what_is_done(keeps: bool, tmp_path: Path) -> None:
     """A signal comes when some cycles are done and most are not: the file has all cells, `finished` says which."""

@@ -209,7 +209,7 @@ def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
         assert math.isnan(at_end.stderr[-1])
         assert at_end.bounds_active[-1] == side
     assert with_delay(report, 0.0, {0.0: 0.04, 1.0: 0.05}, n).bounds_active[-1] == 0
-    assert known.to_dataset().sizes["parameter"] == 3
+    assert known.dataset.sizes["parameter"] == 3
 
 
 def test_a_short_noise_free_log_keeps_the_lag_of_the_motor_and_no_delay() -> None:

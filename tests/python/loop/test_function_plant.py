@@ -315,7 +315,6 @@ def test_copies_share_the_function_and_no_other_process_has_it(library: ctypes.C
     assert pickle.loads(pickle.dumps(FunctionPlant(math.hypot, ["x"]))).input_names == ("x",)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 def test_ctrl_c_leaves_what_was_run(library: ctypes.CDLL) -> None:
     def interrupted(call: Callable[[], Any]) -> Any:
         timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))

@@ -97,7 +97,6 @@ def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
     assert float(few["rms_soc_cad"][1, 1, 0]) == alone.summary["rms_soc_cad"]  # one by one
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 def test_ctrl_c_leaves_a_usable_partial_result() -> None:
     plant, it = VirtualEngine(seed=2), ExtremumSeeking(**SPACE)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))

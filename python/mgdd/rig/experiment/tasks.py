@@ -20,6 +20,7 @@ from mgdd.loop.controller_families import groups_of
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.optimize import FitOptions
+from mgdd.plot.identification import validation_figure
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.results.labels import labelled_dataset
@@ -177,7 +178,7 @@ class IdentifyPlan:
             figures=figures,
             dataset=dataset,
             files={"fit.toml": fit.to_toml()},
-            drawings={"identify": partial(_draw_fit, validation)},
+            drawings={"identify": partial(validation_figure, validation)},
         )
 
 
@@ -238,12 +239,3 @@ def _draw_track(dataset: xr.Dataset) -> Figure:
 
     seen = dataset.assign(angle_deg=dataset["sensed_angle_deg"])
     return drawn(throttle_run, seen, size=(7.0, 5.4))
-
-
-def _draw_fit(validation: Any) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
-    for pane, what in zip(figure.subplots(1, 3), ("free_run", "n_step", "residuals"), strict=True):
-        validation.plot(what, ax=pane)
-    return figure
