@@ -34,7 +34,6 @@ MORE = {"imep": np.array([4.5, 4.1, 4.9]), "T_exh": 600.0 + SLOW**1.1, "t_ms": S
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    pytest.importorskip("h5py")
     write_hdf5(tmp_path / "fast.h5", FILE, UNITS)
     write_hdf5(tmp_path / "all.h5", FILE | MORE, UNITS)
     return tmp_path
@@ -44,8 +43,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("ending", ["nc", "csv", "parquet"])
 @pytest.mark.usefixtures("folder")
 def test_what_was_written_reads_back_equal(ending: str, capsys: Capsys) -> None:
-    if ending == "parquet":
-        pytest.importorskip("pyarrow")
     source = "all.h5" if ending == "nc" else "fast.h5"
     said = out(capsys, "data", "convert", source, "-o", f"bench.{ending}")
     before, after = read(source), read(f"bench.{ending}")
@@ -60,8 +57,6 @@ def test_what_was_written_reads_back_equal(ending: str, capsys: Capsys) -> None:
 @pytest.mark.parametrize("ending", ["nc", "csv", "parquet"])
 @pytest.mark.usefixtures("folder")
 def test_one_cylinder_is_read_from_every_file(ending: str) -> None:
-    if ending == "parquet":
-        pytest.importorskip("pyarrow")
     command = [
         "data",
         "convert",
@@ -201,8 +196,6 @@ def test_sets_are_listed_with_licence_and_place(
 @pytest.mark.parametrize("ending", ["csv", "nc", "parquet"])
 @pytest.mark.usefixtures("folder")
 def test_a_set_is_written_and_reads_back(ending: str, capsys: Capsys) -> None:
-    if ending == "parquet":
-        pytest.importorskip("pyarrow")
     said = out(capsys, "data", "get", "hd_diesel_128x144", "-o", f"hd.{ending}")
     assert said["licence"] == "MIT"
     assert said["files"] == [f"hd_{k}.{ending}" for k in (1, 2, 3, 4)]

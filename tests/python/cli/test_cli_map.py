@@ -210,7 +210,6 @@ def test_a_bench_table_with_units_is_fitted(here: Path, capsys: Capsys) -> None:
 
 
 def test_a_gaussian_process_goes_through_its_file(chain: Path, here: Path, capsys: Capsys) -> None:
-    pytest.importorskip("sklearn")
     table = str(chain / "points.nc")
     options = ["--response", "efficiency_gross", "--kind", "gaussian_process", "--n-starts", "1"]
     told = ran(capsys, "map", "fit", table, *options, "-o", "gp.toml")

@@ -105,7 +105,6 @@ offer() {{
     ],
 )
 def test_bash_completes(words: str, offered: set[str], tmp_path: Path, capsys: Capsys) -> None:
-    pytest.importorskip("shtab")
     assert main(["completion", "bash"]) == 0
     (tmp_path / "script.sh").write_text(capsys.readouterr().out, encoding="utf-8")
     program = _WORDS.format(calls=f"offer {words}")
@@ -117,7 +116,6 @@ def test_bash_completes(words: str, offered: set[str], tmp_path: Path, capsys: C
 
 
 def test_the_script_of_zsh_and_as_json(capsys: Capsys) -> None:
-    pytest.importorskip("shtab")
     assert main(["completion", "zsh"]) == 0
     text = capsys.readouterr().out
     assert text.startswith("#compdef mgdd")

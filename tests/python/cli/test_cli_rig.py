@@ -18,9 +18,6 @@ from mgdd.cli import main
 from mgdd.rig import read_record
 from typed import Capsys
 
-pytest.importorskip("can", reason="the extra `can` is not installed")
-pytest.importorskip("cantools", reason="the extra `can` is not installed")
-
 BUS = "socketcand:can0?host=127.0.0.1&port=1"
 
 
@@ -209,7 +206,6 @@ def test_bad_input_is_named(
 
 def test_check_prints_what_is_compared_before_a_bench(file: Path, capsys: Capsys) -> None:
     """Inputs, time limits and the whole envelope: the list before a run on a bench asks for them."""
-    pytest.importorskip("cantools")
     assert main(["rig", "check", str(file), "--mode", "hil"]) == 0
     said = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines() if " " in line)
     assert said["inputs"] == "duty"

@@ -77,7 +77,6 @@ class DeadBus:
 
 
 def test_a_dead_bus_is_off_for_the_loop() -> None:
-    pytest.importorskip("can")
     transport = RingTransport()
     with BusBridge(DeadBus(), transport) as bridge, make_loop(transport) as loop:  # type: ignore[arg-type]
         assert becomes(lambda: loop.bus_state == "off")

@@ -15,9 +15,6 @@ from mgdd.rig.base import Rig
 from mgdd.rig.exchange import RigRecord
 from mgdd_studies.measured_engine import EngineSurrogate, SurrogatePlant, fit_surrogate, random_step_records
 
-pytest.importorskip("can", reason="the extra `can` is not installed")
-pytest.importorskip("cantools", reason="the extra `can` is not installed")
-
 SAMPLES = 40
 
 

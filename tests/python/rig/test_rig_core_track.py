@@ -30,8 +30,6 @@ from user_buses import dbc_of, write_bus
 
 pytestmark = pytest.mark.slow
 
-pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
-pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
 
 # Another bus than the shipped one: Motorola, volts as they are, a duty of other sign and range, modes with gaps.
 DBC = dbc_of(

@@ -144,8 +144,6 @@ def test_what_a_file_names_is_checked_before_anything_runs(text: str, error: typ
 
 def test_a_run_that_never_began_leaves_no_folder(tmp_path: Path) -> None:
     """The same folder serves once the cause is mended; one that was there stays, empty as it was."""
-    pytest.importorskip("cantools")
-    pytest.importorskip("can")
     known = experiment(TRACK + '[bus]\nconnection = "virtual:none"\npace = "real_time"\n').with_mode("bench")
     with pytest.raises(RigError, match="drives real hardware"):
         run_experiment(known, tmp_path / "run")
@@ -157,7 +155,6 @@ def test_a_run_that_never_began_leaves_no_folder(tmp_path: Path) -> None:
 
 
 def test_modes_that_drive_or_listen_need_what_they_need() -> None:
-    pytest.importorskip("cantools")
     known = experiment(TRACK)
     wired = experiment(TRACK + '[bus]\nconnection = "virtual:none"\n')
     with pytest.raises(ParameterError, match=r"bus\.pace = 'step': must be 'real_time' with mode = 'bench'"):
@@ -220,7 +217,6 @@ def test_one_name_of_a_figure_has_one_meaning(tmp_path: Path) -> None:
     check_labels(result.dataset)
     again = run_experiment(known.with_mode("replay", record=str(tmp_path / "run" / "run.rec")))
     assert again.figures["settling_ms"] == result.figures["settling_ms"]
-    pytest.importorskip("can")
     over_bus = run_experiment(known.with_mode("hil"))
     assert "settling_ms" not in over_bus.figures
     assert over_bus.figures["sensed_mse_deg2"] == pytest.approx(result.figures["sensed_mse_deg2"], rel=0.2)

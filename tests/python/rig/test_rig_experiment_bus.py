@@ -18,9 +18,6 @@ from mgdd.rig import CanRig, Experiment, VirtualNode, read_record, run_experimen
 from mgdd.rig.experiment import ExperimentResult
 from mgdd.rig.experiment.self_test import LIMIT_S, WAYS_OF, WAYS_TO_DIE, SelfTest
 
-pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
-pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
-
 HEAD = 'kind = "experiment"\nformat = 1\nseed = {seed}\n'
 TRACK = (
     HEAD

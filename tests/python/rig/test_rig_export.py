@@ -38,7 +38,6 @@ def record(tmp_path: Path) -> Path:
 
 
 def test_messages_and_back() -> None:
-    pytest.importorskip("can")
     for frame in [*CLASSIC, FD, Frame(id=0x40, error=True, data=bytes(8))]:
         back = frame_of(message_of(frame), monotonic_ns=frame.monotonic_ns, channel=frame.channel)
         assert back == frame
@@ -83,7 +82,6 @@ def test_mf4_holds_everything(record: Path, tmp_path: Path) -> None:
 
 
 def test_mf4_is_a_bus_log_for_others(record: Path, tmp_path: Path) -> None:
-    pytest.importorskip("asammdf")
     reader = pytest.importorskip("can.io.mf4").MF4Reader
     with reader(export_record(record, tmp_path / "run.mf4")[0]) as log:
         messages = {(m.arbitration_id, bytes(m.data), m.is_fd, m.is_rx, m.is_remote_frame) for m in log}
@@ -135,10 +133,6 @@ def test_parquet(record: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["csv", "netcdf", "parquet", "mf4", "blf", "asc", "log"])
 def test_a_record_without_anything(tmp_path: Path, kind: str) -> None:
-    for package in {"parquet": ["pyarrow"], "mf4": ["asammdf"], "blf": ["can"], "asc": ["can"], "log": ["can"]}.get(
-        kind, []
-    ):
-        pytest.importorskip(package)
     Recorder(tmp_path / "run.rec").close()
     assert all(file.is_file() for file in export_record(tmp_path / "run.rec", tmp_path / "out", kind=kind))
 
@@ -165,7 +159,6 @@ def test_refused_targets_leave_nothing(record: Path, tmp_path: Path, monkeypatch
 def test_an_old_file_stays_when_the_new_one_fails(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("can")
     target = tmp_path / "run.log"
     target.write_text("yesterday")
 

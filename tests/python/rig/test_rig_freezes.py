@@ -18,9 +18,6 @@ import pytest
 
 from mgdd.rig import VirtualNode
 
-pytest.importorskip("can", reason="the extra `can` is not installed")
-pytest.importorskip("cantools", reason="the extra `can` is not installed")
-
 HOST = Path(__file__).parents[1] / "support" / "steady_host.py"
 PARTS = ("node", "hub", "host")
 WAYS = ("goes on", "falls silent", "arms again")  # what the host does while another part stands still

@@ -17,9 +17,6 @@ from mgdd.rig.realtime import Frame
 from mgdd.rig.recorder import RecordedBus
 from realtime_loops import becomes
 
-pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
-pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
-
 ETB = SignalMap.load("etb")
 COMMAND = (0x120, False)
 

@@ -64,8 +64,6 @@ def test_what_is_told_was_read_at_its_point(settling: int) -> None:
 
 @pytest.mark.slow
 def test_a_bus_that_carries_the_axes_carries_the_search(tmp_path: Path) -> None:
-    pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
-    pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
     with pytest.raises(
         ParameterError, match=r"inputs = 'soc_cad': must be speed_rpm, fuel_mg, soc_cad: so task = 'map'"
     ):

@@ -14,9 +14,6 @@ from mgdd.loop import Measurement, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.rig import CanRig, VirtualNode
 
-pytest.importorskip("can", reason="the extra `can` is not installed")
-pytest.importorskip("cantools", reason="the extra `can` is not installed")
-
 
 @pytest.mark.slow
 def test_seeking_on_the_virtual_engine_over_the_bus() -> None:

@@ -29,7 +29,6 @@ AS_NOBODY = [
 
 def missing() -> str | None:
     """Give the reason why this machine cannot boot it."""
-    pytest.importorskip("can", reason="python-can is not installed")
     if "libasan" in os.environ.get("LD_PRELOAD", ""):
         return "AddressSanitizer's shadow memory does not fit into the 512 GiB that this kernel gives a process"
     if shutil.which("linux.uml") is None:

@@ -12,8 +12,6 @@ from mgdd.rig import CanRig, SignalMap
 from mgdd.rig.can.node import node_of
 from mgdd.rig.can.node_core import NodeCore, node_plant
 
-pytest.importorskip("cantools", reason="the extra `can` is not installed")
-
 BENCH = """VERSION ""
 
 NS_ :

@@ -309,7 +309,6 @@ def test_without_bokeh_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, capsy
 
 
 def test_a_port_in_use_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("bokeh")
     path = small_record(tmp_path / "run.rec")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -319,7 +318,6 @@ def test_a_port_in_use_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 @pytest.fixture
 def page(tmp_path: Path) -> Iterator[str]:
-    pytest.importorskip("bokeh")
     with watch(small_record(tmp_path / "run.rec")) as opened:
         assert opened.url in opened._repr_html_()
         yield opened.url
@@ -373,7 +371,6 @@ def test_a_name_of_somebody_else_that_means_this_machine_gets_nothing(page: str)
 
 @pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="no /proc")
 def test_the_word_stands_in_the_arguments_of_no_process(tmp_path: Path) -> None:
-    pytest.importorskip("bokeh")
     told, browser = tmp_path / "told", tmp_path / "browser"
     browser.write_text(f'#!/bin/sh\nprintf "%s" "$*" > "{told}.new"\nmv "{told}.new" "{told}"\n', encoding="utf-8")
     browser.chmod(0o700)
@@ -414,7 +411,6 @@ def _addresses() -> list[str]:
 @pytest.mark.slow
 @needs_chromium
 def test_bad_records_and_markup_make_a_clear_page(tmp_path: Path) -> None:
-    pytest.importorskip("bokeh")
     path = tmp_path / "run.rec"
     with Recorder(path) as record:
         record.sample(MARKUP, {f"$$x$$ {MARKUP}_deg": 3.0})
@@ -437,7 +433,6 @@ def test_bad_records_and_markup_make_a_clear_page(tmp_path: Path) -> None:
 @pytest.mark.slow
 @needs_chromium
 def test_a_click_on_stop_brings_the_plate_home_and_browsers_leave_the_loop_alone(tmp_path: Path) -> None:
-    pytest.importorskip("bokeh")
     path = tmp_path / "run.rec"
     command = [sys.executable, "-m", "mgdd.rig.live.simulated", str(path), "5"]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as rig:

@@ -3,6 +3,7 @@
 import builtins
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 
@@ -18,7 +19,6 @@ from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle, to_iosystem
     ids=["P1", "lugre", "backlash"],
 )
 def test_the_response_is_our_simulation(throttle: Throttle) -> None:
-    control = pytest.importorskip("control")
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
     ours = simulate_throttle(throttle, duty, time_s=time, start_deg=20.0)["angle_deg"].to_numpy()
@@ -32,7 +32,6 @@ def test_the_response_is_our_simulation(throttle: Throttle) -> None:
 @pytest.mark.parametrize("kind", ["pw_r", "pw_w", "pw_p"])
 @pytest.mark.parametrize("delay", [0, 2])
 def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) -> None:
-    control = pytest.importorskip("control")
     own = {
         "pw_r": {},
         "pw_w": {f"rise_{i}_deg": 12.0 for i in range(1, 7)},
@@ -49,7 +48,6 @@ def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) ->
 
 
 def test_a_loop_closes_around_it() -> None:
-    control = pytest.importorskip("control")
     plant, rest = to_iosystem(Throttle(), sample_s=2e-3)
     gain = control.tf([0.02], [1.0], 2e-3, inputs=["error"], outputs=["duty"], name="gain")
     add = control.summing_junction(inputs=["reference", "-angle_deg"], output="error", name="add", dt=2e-3)
@@ -62,7 +60,6 @@ def test_a_loop_closes_around_it() -> None:
 
 
 def test_bad_samples_and_starts_are_refused() -> None:
-    pytest.importorskip("control")
     with pytest.raises(ParameterError, match="sample"):
         to_iosystem(Throttle(), sample_s=1.5e-4)
     with pytest.raises(ParameterError, match=r"start_deg = 95: must lie within the travel"):
@@ -83,7 +80,6 @@ def test_the_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyP
 
 
 def test_a_fit_responds_as_its_model_runs_with_its_delay() -> None:
-    control = pytest.importorskip("control")
     numbers = {**FirstPrincipleModel().parameters, "tau_s": 0.05, "delay_samples": 3.0}
     model = FirstPrincipleModel(parameters=numbers, substeps=20)
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.3, hold_s=0.05)
