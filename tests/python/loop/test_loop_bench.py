@@ -14,7 +14,6 @@ from mgdd.loop import SensorDynamics, VirtualEngine
 from mgdd.results.labels import check_labels
 
 QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
-SILENT = SensorDynamics(delay_s=3.0, lag_s=2.0)
 RICH = {
     "performance": Performance.efficiency_and_nox(),
     "limits": ["p_max_bar", "cov_imep_percent"],

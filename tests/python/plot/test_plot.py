@@ -122,12 +122,6 @@ PLOTS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
-
-
 def line(ax, label):
     found = [item for item in ax.get_lines() if item.get_label() == label]
     assert len(found) == 1, [item.get_label() for item in ax.get_lines()]
@@ -464,12 +458,6 @@ ALL = {
     residual_correlation: (correlations, "", "residual with itself [-]"),
     plot.correlation_matrix: (matrix, "", ""),
 }
-
-
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
 
 
 @pytest.mark.parametrize("draw", ALL, ids=lambda f: f.__name__)

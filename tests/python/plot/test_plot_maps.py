@@ -1,6 +1,5 @@
 """Figures of maps: the Dataset's own numbers, gaps left white, marks of the cells, what is refused."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -14,12 +13,6 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.maps import CalibrationMap, apply_map, compare_maps, optimize_map
 from mgdd.plot import map_cells, map_contour, trade_off
 from mgdd.results.labels import labelled_dataset
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def consumption() -> xr.Dataset:
