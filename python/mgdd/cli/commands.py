@@ -64,26 +64,26 @@ COMMANDS = {
     "map optimize": Command(
         "find the best value of an input at every operating point of a table, under limits",
         "table.nc --maximize efficiency_gross --along soc_cad --limit p_max_bar=130 --max-loss 0.002 -o best.nc",
-        "map_optimize", _MAP),
+        "maps", _MAP),
     "map seek": Command(
         "seek a map on the virtual engine, from a rough model and as few visits of operating points as possible",
         "--over speed_rpm=1000:2500:4 --over fuel_mg=10:25:4 --limit p_max_bar=120 --guide model "
         "--guide-set wall_heat_scale=1.0 --visits 16 -o map.nc", "map_seek", _MAP),
     "map smooth": Command(
         "smooth a map inside of the allowed ranges of its cells, under limits on its slopes",
-        "best.nc --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.nc", "map_optimize", _MAP),
+        "best.nc --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.nc", "maps", _MAP),
     "map show": Command(
         "show a map with breakpoints, units, and the limits and sources of its cells",
-        "smooth.nc --sweep table.nc --figure smooth.png", "map_show", _MAP),
+        "smooth.nc --sweep table.nc --figure smooth.png", "maps", _MAP),
     "map diff": Command(
         "subtract one map from another at the breakpoints of both",
-        "best.nc smooth.nc --tolerance 1 --figure diff.png", "map_show", ".nc, the differences, or .json"),
+        "best.nc smooth.nc --tolerance 1 --figure diff.png", "maps", ".nc, the differences, or .json"),
     "map trade-off": Command(
         "set two variables of a table against each other along an input: what one costs in the other",
         "table.nc --right p_max_bar --up efficiency_gross --at speed_rpm=2200 --map smooth.nc "
         "--figure trade_off.png", "map_trade_off"),
     "map export": Command(
-        "write maps in another form: netCDF, CSV, DCM, CDFX", "smooth.nc --label SocBase -o engine.dcm", "map_export",
+        "write maps in another form: netCDF, CSV, DCM, CDFX", "smooth.nc --label SocBase -o engine.dcm", "maps",
         f"{_MAP}, which may hold several maps"),
     "throttle": Command("an electronic throttle: simulate, demand, excite, identify, validate, track, tune, export"),
     "throttle simulate": Command(
