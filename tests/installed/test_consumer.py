@@ -1,7 +1,5 @@
 """A C++ project finds an installed mgdd, wherever its headers were put, and gets the same bits whatever its flags."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The package as a user installs it: `make wheel-check` puts it alone into an environment outside the repository."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

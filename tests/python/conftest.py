@@ -1,7 +1,5 @@
 """The fixtures of all tests."""
 
-from __future__ import annotations
-
 from fixtures import _figures_are_closed, _signals_are_left_as_found, no_thread_is_left, quick_study, root
 
 __all__ = ["_figures_are_closed", "_signals_are_left_as_found", "no_thread_is_left", "quick_study", "root"]

@@ -1,7 +1,5 @@
 """Arguments of the wrong kind are named with the remedy; arrays are taken in every form of `numpy.asarray`."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator

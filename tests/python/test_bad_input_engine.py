@@ -1,7 +1,5 @@
 """Bad input to records, engine and calibration: an error that names field, value and remedy, and nothing changed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every public class as an object: pickles and copies by each protocol or says why not; one never made is refused."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

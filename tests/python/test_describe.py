@@ -1,7 +1,5 @@
 """What objects show of themselves: a short text and an HTML table, with units, for every result, preset and model."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Callable

@@ -5,8 +5,6 @@ number, with what ``NAME`` in `tools/docs_tables.py` computes now; a printed num
 In the same way ``<!-- number: NAME -->`` goes before a single number.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import itertools

@@ -1,7 +1,5 @@
 """Edges of the parameter space: values that are allowed, states that are not, and answers that stay honest there."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

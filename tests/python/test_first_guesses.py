@@ -1,7 +1,5 @@
 """First guesses of a newcomer: what works, and what the message of the others names; nothing is paid for it."""
 
-from __future__ import annotations
-
 import inspect
 import pickle
 import re

@@ -1,7 +1,5 @@
 """Every batch call of the core lets other threads run: a second thread makes progress while it computes."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

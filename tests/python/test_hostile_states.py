@@ -1,7 +1,5 @@
 """A saved state with numbers that no run can have made is refused, or the run goes on; the process never ends."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import itertools

@@ -1,7 +1,5 @@
 """One object, several threads: a call that would run into another one is refused, nothing is corrupted or lost."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import threading

@@ -1,7 +1,5 @@
 """Laws of the independent throttles that identification is measured on."""
 
-from __future__ import annotations
-
 import ast
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The mutation tool: what it changes, what it leaves alone, and the interval that it prints."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import json

@@ -1,7 +1,5 @@
 """Every Dataset that a public name hands out can be written as netCDF, and pint reads its units."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import io

@@ -1,7 +1,5 @@
 """Ten tasks as somebody guesses them from the names, without having read a page; and what a wrong guess is told."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Twenty searches as a newcomer writes them, at most six lines each: they run, find the best, and say what they did."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Levels of the pressure: a tone has its level in its band, bands share out the square, weights are the standard's."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the reader sees runs: notebooks, the examples of every docstring and page, the docs build itself."""
 
-from __future__ import annotations
-
 import doctest
 import importlib
 import re

@@ -1,7 +1,5 @@
 """Calibration and best timing of engines that share no code with the package: their gas, four wall-heat laws, leaks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Seekers that a user writes: those of the page run as any other, and keep what their authors promise."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

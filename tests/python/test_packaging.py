@@ -1,7 +1,5 @@
 """The package: light to import, one version everywhere, typed, stubs that agree with the module."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import importlib.resources
 import os

@@ -1,7 +1,5 @@
 """What is public: each name in one place; `test_docs.py` looks for its page."""
 
-from __future__ import annotations
-
 import importlib
 
 from public_objects import ROOMS

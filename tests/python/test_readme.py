@@ -1,7 +1,5 @@
 """README and tour are true today: their numbers are recomputed, their commands exist, their pictures are there."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

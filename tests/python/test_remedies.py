@@ -1,7 +1,5 @@
 """A message names an argument only where the function that was called takes it: every remedy is tried at its door."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """One contract of every result: data, text, HTML, figure, file and table; and every figure takes it or its Dataset."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pickle

@@ -1,7 +1,5 @@
 """One name of an argument has one meaning in every public signature, which is found here by the code."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import inspect

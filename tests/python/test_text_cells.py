@@ -1,7 +1,5 @@
 """Cells of a text or a sheet that are empty, units that are none, and rows that are cycles."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

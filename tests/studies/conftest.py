@@ -1,7 +1,5 @@
 """The fixtures of all tests, and the mark of those of the studies, which `make test` leaves out."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from types import ModuleType

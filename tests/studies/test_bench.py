@@ -1,7 +1,5 @@
 """The studies of seekers, sensors and tests on the virtual bench: laws of their tables, labels, figures."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Records of the benchmarks: fetched once, checked, and read as what they are."""
 
-from __future__ import annotations
-
 import hashlib
 import http.server
 import os

@@ -1,7 +1,5 @@
 """Studies of chapter 6: what the engine teaches its model, and whether a guide that learns beats one that does not."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

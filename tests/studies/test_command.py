@@ -1,7 +1,5 @@
 """`mgdd study`: the list, the JSON object, the table, the figures, refusals, and Ctrl-C."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Seven cases of delay: the phase decides over the sign of the step, and the counts hold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

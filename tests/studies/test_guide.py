@@ -1,7 +1,5 @@
 """Studies of guides: what each case is, counted by hand, the transients, and what few seeds already show."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

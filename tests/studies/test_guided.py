@@ -1,7 +1,5 @@
 """The study `guided`: a rough model saves cycles and J at the start, and its option of the measured engine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

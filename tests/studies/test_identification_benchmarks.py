@@ -1,7 +1,5 @@
 """Measured benchmarks: loaders, models and fits; those on measured data are skipped where the sets are missing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

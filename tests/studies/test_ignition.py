@@ -1,7 +1,5 @@
 """The study of the ignition delay: laws of injection and combustion, and what few cells and seeds already show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The study from design to map: one calibration and its parts, drives, and what few seeds already show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

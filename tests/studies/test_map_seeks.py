@@ -1,7 +1,5 @@
 """The study of the map that seeks: judgement by hand, trouble, guides, and what few seeds already show."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 from collections.abc import Callable

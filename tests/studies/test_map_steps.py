@@ -1,7 +1,5 @@
 """The engine behind the study from design to map, the truth that maps are judged by, and each step on its own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

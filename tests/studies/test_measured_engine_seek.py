@@ -1,7 +1,5 @@
 """The study of seekers on the surrogate of a measured engine: laws on made records, facts on the measured ones."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

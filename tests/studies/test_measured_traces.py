@@ -1,7 +1,5 @@
 """The main job on the measured traces, the page that it writes, and the table of the tour."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Every study as a page: complete, self-contained; its sections and its verdict."""
 
-from __future__ import annotations
-
 import html
 import itertools
 import json

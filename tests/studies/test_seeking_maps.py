@@ -1,7 +1,5 @@
 """Maps, guides and plants that seekers are judged on: inputs of unlike units, counted in fortieths of their bounds."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Any

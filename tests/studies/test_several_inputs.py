@@ -1,7 +1,5 @@
 """The study `seekers-several-inputs`: its tables say what their runs did, and the order of the seekers holds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

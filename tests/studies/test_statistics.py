@@ -1,7 +1,5 @@
 """Means over seeds and the curves of them: intervals cover as they say, what never arrived is left out."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

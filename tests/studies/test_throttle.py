@@ -1,7 +1,5 @@
 """Studies of the throttle: the habits of the plant, the first-principle fit of noisy logs, the controllers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType

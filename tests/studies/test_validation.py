@@ -1,7 +1,5 @@
 """The study of model validation: laws of its stages and draws on traces that the model itself made, and a quick run."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 

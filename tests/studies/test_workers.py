@@ -1,7 +1,5 @@
 """Studies whose parts are shared by workers: the same tables, and what is left when the work is cut short."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import os

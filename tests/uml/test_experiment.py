@@ -1,7 +1,5 @@
 """An experiment over vcan whose loop has a raw socket of its own: run by tests/python/rig/test_rig_uml.py."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """On a kernel with CAN: run in User-Mode Linux by tests/python/rig/test_rig_uml.py, or by hand where vcan0 exists."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import time

@@ -1,7 +1,5 @@
 """A call with arrays for every public function that takes arrays; `test_array_inputs` gives them in other forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Debian's Chromium without a window, driven by its own protocol over the websocket client that Bokeh brings along."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import json

@@ -1,7 +1,5 @@
 """A virtual throttle behind a virtual bus of this process, and what its host sends."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Compilers, CMake and what they make, as programs that must succeed."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

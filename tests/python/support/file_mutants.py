@@ -1,7 +1,5 @@
 """Small faults of a file: what a disk, an editor, a spreadsheet or a person does to it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

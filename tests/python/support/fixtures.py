@@ -1,7 +1,5 @@
 """Fixtures of all tests: where the repository stands, reproducible Hypothesis, figures without a screen."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

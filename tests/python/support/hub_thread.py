@@ -1,7 +1,5 @@
 """A hub in a thread of the test, for transports of the same process."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Iterator, Sequence

@@ -5,8 +5,6 @@ crevice at wall temperature, blow-by through a choked gap, one of four wall-heat
 strokes with waves. Fuel, timing, duration and charge vary from cycle to cycle. By Runge-Kutta over all cycles at once.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -8,8 +8,6 @@ current exact for a held speed; dry friction stops a mass that would turn around
 Sources: LuGre friction by Canudas de Wit et al. (1995), the Stribeck curve by Armstrong-Helouvry et al. (1994).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

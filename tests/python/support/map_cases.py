@@ -1,7 +1,5 @@
 """Sweeps whose optima are known in closed form: uneven axes, another optimum, bend and limit in every cell."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

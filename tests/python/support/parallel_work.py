@@ -1,7 +1,5 @@
 """Work for executors of several processes, which import it by name; and executors that misbehave."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

@@ -1,7 +1,5 @@
 """An experiment over a bus at real-time pace that a busy machine can run: slow cycles, long time limits."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A measured pressure, five whole cycles made of it, and a writer of columns as text."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Modules and public classes of both packages, found by walking them, and an object of each class made simply."""
 
-from __future__ import annotations
-
 import contextlib
 import doctest
 import importlib

@@ -1,7 +1,5 @@
 """A real-time loop of a throttle that waits for a busy machine, and how a test waits for it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

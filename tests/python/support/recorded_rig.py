@@ -1,7 +1,5 @@
 """A record with something of every kind, asymmetric in all of it, and a reader of its own."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zlib

@@ -1,11 +1,9 @@
 """A throttle behind a safety gate, at 1 kHz or in a node, and the hazards of a rig with what must follow from each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 from mgdd.control import Pid
 from mgdd.loop import ThrottleFault, VirtualThrottle
@@ -117,7 +115,7 @@ class Loop:
         while self.k < k:
             self.step()
 
-    def started(self) -> Loop:
+    def started(self) -> Self:
         """Give the loop with the plate at its reference, one sample before the onset."""
         self.until(60)
         self.gate.arm()

@@ -1,7 +1,5 @@
 """A good file of every kind that mgdd reads, and the readers that take it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from functools import cache

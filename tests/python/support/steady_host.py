@@ -4,8 +4,6 @@ It reads a line at a time: `drive` arms and drives from then on, `stop` falls si
 every line again when it has acted on it.
 """
 
-from __future__ import annotations
-
 import select
 import sys
 import time

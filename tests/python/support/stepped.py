@@ -1,7 +1,5 @@
 """Every seeker that is stepped by ask and tell, found in the package: each class and each form of it."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Iterator, Mapping

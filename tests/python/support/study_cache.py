@@ -3,8 +3,6 @@
 The results lie below build/studies, in a folder named after what made them: the module, its sources and its data.
 """
 
-from __future__ import annotations
-
 import fcntl
 import functools
 import hashlib

@@ -1,7 +1,5 @@
 """Files of columns in every format, each written by its own library."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

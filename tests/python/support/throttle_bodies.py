@@ -1,7 +1,5 @@
 """Forty random independent throttles and the logs that a user would take of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A virtual throttle behind a ring transport, served by a thread of Python, and the messages that it speaks."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any, Self

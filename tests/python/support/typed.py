@@ -1,7 +1,5 @@
 """Commands as a program types them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Buses of other people: their DBC, and maps of it, written into a folder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 
