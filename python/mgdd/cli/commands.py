@@ -113,6 +113,9 @@ COMMANDS = {
     "throttle export": Command(
         "write a controller as C++ for a target, with the samples of a tracked run as its test",
         "pid --preset P2 --float -o target", "throttle_track", "a folder: settings, step, test vectors, CMake"),
+    "workbench": Command(
+        "pages in a browser of this machine: drop pressure files, check them, find the best timing, seek, make maps",
+        "", "workbench"),
     "rig": Command("experiments in process, over a CAN bus and on a bench"),
     "rig run": Command(
         "run an experiment: identify or track on a throttle, seek or map on an engine; in process, over a bus, on a "

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 import time
-import webbrowser
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from html import escape
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from mgdd.cli.browser import add_browser, before_serving, lower_priority, serve_page
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import option, refuse_idle, require_positive
 from mgdd.cli.output import emit, lines, warn, wrote
 from mgdd.cli.progress import Stopped
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError
 from mgdd.rig import CanRig, Experiment, Recorder, export_record, run_experiment, watch
 from mgdd.rig.can.can_rig import MODES
 from mgdd.rig.can.transport import CanTransport
@@ -177,9 +174,8 @@ def _export(args: argparse.Namespace) -> None:
     emit(args, {"files": written}, text="\n".join(written))
 
 
-_LAST_PORT = 65_535
 _NICE = 10  # a loop that is late costs more than a picture that is
-_OPTIONS = Options(watch, "port", signal_map="map")
+_OPTIONS = Options(watch, signal_map="map")
 
 
 def _add_watch(parser: Any) -> None:
@@ -187,18 +183,7 @@ def _add_watch(parser: Any) -> None:
            "folder of a run that goes on or is over, a record, a bus to listen on, or a simulated throttle",
            default="simulate", nargs="?")  # fmt: skip
     _OPTIONS.add(parser)
-    option(parser, "--no-browser", "print the address and open nothing")
-
-
-def _way_to(address: str, folder: Path) -> Path:
-    """Write a page that leads to the address: all users of the machine may read the arguments of a browser."""
-    file = folder / "mgdd.html"  # in a folder of this user alone
-    file.write_text(
-        f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={escape(address)}">'
-        f'<title>mgdd rig watch</title><a href="{escape(address)}">mgdd rig watch</a>\n',
-        encoding="utf-8",
-    )
-    return file
+    add_browser(parser)
 
 
 def _watch(args: argparse.Namespace) -> None:
@@ -207,26 +192,21 @@ def _watch(args: argparse.Namespace) -> None:
     from mgdd.rig.live.page import serve
     from mgdd.rig.live.sources import source_of
 
-    how = _OPTIONS.of(args)
-    if not 0 <= how["port"] <= _LAST_PORT:
-        raise ParameterError.of("--port", how["port"], f"0 to {_LAST_PORT}")
+    before_serving(args)
     import_extra("bokeh", "watch", "a live page")  # before a simulation is started
-    args.progress.close()
-    source = source_of(args.source, how["signal_map"])
+    source = source_of(args.source, _OPTIONS.of(args)["signal_map"])
 
-    with TemporaryDirectory(prefix="mgdd-watch-", ignore_cleanup_errors=True) as folder:
+    def served(port: int, ready: Callable[[str], None]) -> None:
+        def begun(address: str) -> None:
+            lower_priority(_NICE)  # now that the simulation has begun: that one shall not yield
+            ready(address)
 
-        def ready(address: str) -> None:
-            if hasattr(os, "nice"):
-                os.nice(_NICE)  # now that the simulation has begun: that one shall not yield
-            print(address, file=sys.stderr if args.json else sys.stdout, flush=True)
-            if not args.no_browser:
-                webbrowser.open(_way_to(address, Path(folder)).as_uri())
+        serve(source, port, begun, alive=parent_watch())
 
-        try:
-            serve(source, how["port"], ready, alive=parent_watch())
-        finally:
-            source.close()
+    try:
+        serve_page(args, "mgdd rig watch", served)
+    finally:
+        source.close()
     emit(args, {"watched": source.name, "said": source.said, "trouble": source.trouble})
 
 

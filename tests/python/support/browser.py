@@ -28,6 +28,14 @@ async def _connected(address: str) -> Any:
     return await websocket_connect(address, max_message_size=1 << 26)
 
 
+def _labelled(label: str, kind: str) -> str:
+    """Write the search of a field by the label above it."""
+    return (
+        f"{_DEEP}.find((one) => one.localName == 'label' && one.innerText.trim() == {json.dumps(label)})"
+        f".parentElement.querySelector('{kind}')"
+    )
+
+
 class Browser:
     """One page in one browser process."""
 
@@ -93,13 +101,51 @@ class Browser:
 
     def click(self, label: str) -> None:
         """Press and release the mouse in the middle of a button, as a hand does."""
-        box = self.evaluate(
-            f"(() => {{ const box = {_DEEP}.find((one) => one.localName == 'button' && "
-            f"one.innerText.includes({json.dumps(label)})).getBoundingClientRect(); "
-            "return [box.x + box.width / 2, box.y + box.height / 2]; })()"
+        self._press(
+            f"{_DEEP}.find((one) => one.localName == 'button' && one.innerText.includes({json.dumps(label)}) && "
+            "one.getBoundingClientRect().width > 0)"
         )
+
+    def _press(self, element: str) -> None:
+        box, until = None, time.monotonic() + 30.0
+        while box is None and time.monotonic() < until:
+            box = self.evaluate(
+                f"(() => {{ const own = {element}; own.scrollIntoViewIfNeeded(); const box = "
+                "own.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; })()"
+            )
+            if box is None:  # it is not there yet
+                time.sleep(0.1)
+        assert box is not None, element
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
+
+    def upload(self, *files: Path, place: int = 0) -> None:
+        """Give files to an input for them, as the dialog behind it does."""
+        inputs = f"{_DEEP}.filter((one) => one.localName == 'input' && one.type == 'file')"
+        handle = self.call("Runtime.evaluate", expression=f"{inputs}[{place}]")["result"]["objectId"]
+        self.call("DOM.setFileInputFiles", files=[str(file) for file in files], objectId=handle)
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose an option of the list with that label."""
+        self.evaluate(
+            f"(() => {{ const own = {_labelled(label, 'select')}; own.value = [...own.options].find((one) => "
+            f"one.text == {json.dumps(option)}).value; own.dispatchEvent(new Event('change')); }})()"
+        )
+
+    def enter(self, label: str, text: str) -> None:
+        """Type into the field with that label, over what stands there."""
+        self.evaluate(f"(() => {{ const own = {_labelled(label, 'input')}; own.focus(); own.select(); }})()")
+        self.call("Input.insertText", text=text)
+        self.evaluate(f"{_labelled(label, 'input')}.blur()")
+
+    def tab(self, title: str) -> None:
+        """Click on the head of a tab."""
+        self._press(f"{_DEEP}.find((one) => one.className == 'bk-tab' || one.className == 'bk-tab bk-active' ? "
+                    f"one.innerText.trim() == {json.dumps(title)} : false)")  # fmt: skip
+
+    def loaded(self) -> list[str]:
+        """Give the addresses of all that the page has asked for."""
+        return self.evaluate("performance.getEntriesByType('resource').map((one) => one.name)")
 
     def screenshot(self, file: Path) -> None:
         file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))

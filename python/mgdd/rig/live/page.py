@@ -1,22 +1,17 @@
-"""The page itself: a Bokeh document per browser, and the server of this machine that serves it."""
+"""The page itself: a Bokeh document per browser."""
 
 from __future__ import annotations
 
-import asyncio
-import errno
 import logging
-import secrets
-import signal
-import socket
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html import escape
 from typing import Any
 
 import numpy as np
 
-from mgdd.errors import RigError
 from mgdd.io.extras import import_extra
 from mgdd.rig.live.live_data import EDGES_US, Line, LiveData, thinned
+from mgdd.rig.live.server import serve_here
 from mgdd.rig.live.sources import Source
 
 _LOG = logging.getLogger(__name__)
@@ -29,7 +24,6 @@ _GOOD = {"run": "#2e7d32", "armed": "#b26a00", "init": "#555", "limp": "#c62828"
 _SD_OF_95 = 1.96
 _HEIGHT, _LEGEND_ROW, _WIDE_LABEL, _LONGEST_LABEL = 240, 22, 26, 34  # pixels, and letters
 _BROKEN_S = 3
-_OURS = frozenset({"127.0.0.1", "localhost"})
 _TEMPLATE = """{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 8px; font-family: sans-serif; }
@@ -239,52 +233,13 @@ def _timing_text(data: LiveData) -> str:
 
 
 def serve(source: Source, port: int, ready: Callable[[str], None], *, alive: Callable[[], bool] = lambda: True) -> None:
-    """Serve the page on this machine alone until Ctrl-C or SIGTERM, or `alive` says no.
-
-    Its address, with a secret word, goes to `ready`. ImportError without Bokeh, RigError for a port in use.
-    """
+    """Serve the page of a source, as `serve_here` does."""
     server_of = _bokeh("server.server").Server
-    logging.getLogger("bokeh").setLevel(logging.ERROR)
-    logging.getLogger("tornado.access").setLevel(logging.CRITICAL)
-    routing, web = (import_extra(f"tornado.{name}", "watch", "a live page") for name in ("routing", "web"))
-    path = f"/{secrets.token_urlsafe(16)}"
-
-    class Foreign(routing.Matcher):  # type: ignore[misc, name-defined]
-        """A name of somebody else that has come to mean this machine: a page of his must not read from here."""
-
-        def match(self, request: Any) -> dict[str, Any] | None:
-            return None if request.host_name in _OURS else {}
 
     def show(document: Any) -> None:
         _View(source, document)
 
-    try:
-        socket.create_server(("127.0.0.1", port)).close()  # the server leaves a socket behind where it fails
-        server = server_of(
-            {path: show}, port=port, address="127.0.0.1",
-            allow_websocket_origin=sorted(_OURS), use_index=False, redirect_root=False,
-            check_unused_sessions_milliseconds=2000, unused_session_lifetime_milliseconds=5000,
-        )  # fmt: skip
-    except OSError as error:
-        why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
-        raise RigError(f"port {port} {why}: name another one, 0 takes a free one") from error
-    server._tornado.default_router.rules.insert(0, routing.Rule(Foreign(), web.ErrorHandler, {"status_code": 403}))
-    loop = server.io_loop.asyncio_loop
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, loop.stop)
+    def made(path: str, options: Mapping[str, Any]) -> Any:
+        return server_of({path: show}, use_index=False, redirect_root=False, **options)
 
-    async def watch() -> None:
-        while alive():
-            await asyncio.sleep(0.5)
-        loop.stop()
-
-    watching = loop.create_task(watch())
-    server.start()
-    ready(f"http://127.0.0.1:{server.port}{path}")
-    try:
-        loop.run_forever()
-    finally:
-        watching.cancel()
-        server.stop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(number)
+    serve_here(made, port, ready, alive=alive)

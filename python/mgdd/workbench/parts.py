@@ -1,0 +1,269 @@
+"""What views are made of: text as HTML that is escaped, tables, badges, fields of a form, and a job with its bar."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from io import BytesIO
+from typing import Any, cast
+
+from mgdd.errors import Error
+from mgdd.io.extras import import_extra
+from mgdd.workbench.calls import Script
+from mgdd.workbench.jobs import Job
+
+_TICK_MS = 60
+_STYLE = """
+:host { font: 14px/1.5 system-ui, sans-serif; color: var(--panel-on-background-color); }
+h2 { font-size: 17px; margin: 0 0 4px; } p { margin: 2px 0; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: 4px 10px 4px 0; text-align: left; border-bottom: 1px solid var(--panel-border-color);
+  vertical-align: top; } td.n, th.n { text-align: right; white-space: nowrap; } th { font-weight: 600; }
+.badge { display: inline-block; padding: 0 8px; border-radius: 10px; color: white; white-space: nowrap;
+  font-size: 13px; }
+.good { background: #2e7d32; } .open { background: #5f6b7a; } .doubt { background: #b25e00; }
+.fail { background: #c62828; } .quiet { opacity: .75; } .bad { color: #d32f2f; font-weight: 600; }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel-surface-color); padding: 8px;
+  margin: 4px 0; border-radius: 4px; font-size: 12.5px; }
+.check { padding: 6px 0; border-bottom: 1px solid var(--panel-border-color); }
+@media (max-width: 600px) { th { display: none; } tr { display: block; padding: 4px 0; } td, td.n { display: flex;
+  justify-content: space-between; gap: 12px; border: 0; padding: 1px 0; text-align: right; white-space: normal; }
+  td::before { content: attr(title); opacity: .75; text-align: left; }
+  tr { border-bottom: 1px solid var(--panel-border-color); } }
+.check b { display: inline-block; min-width: 9em; }
+"""
+_DROP = ".filepond--panel > * { background: var(--panel-surface-color) !important; }"
+_BADGES = {"no fault found": "good", "open": "open", "doubt": "doubt", "fail": "fail"}
+
+
+def panel() -> Any:
+    """Import Panel."""
+    return import_extra("panel", "workbench", "the workbench")
+
+
+def page(html: str = "", **options: Any) -> Any:
+    """Make a piece of HTML; whoever gives it has escaped what is not ours."""
+    return panel().pane.HTML(html, stylesheets=[_STYLE], sizing_mode="stretch_width", margin=(4, 8), **options)
+
+
+def side(*items: Any) -> Any:
+    """Set items side by side, as many as fit."""
+    return panel().FlexBox(*items, gap="0 4px", align_items="end", sizing_mode="stretch_width")
+
+
+def column(*items: Any) -> Any:
+    """Set items below each other."""
+    return panel().Column(*items, sizing_mode="stretch_width")
+
+
+def card(title: str, *items: Any, collapsed: bool = True) -> Any:
+    """Set items below a title that opens and closes them."""
+    return panel().Card(*items, title=title, collapsed=collapsed, sizing_mode="stretch_width", margin=(6, 8))
+
+
+def button(name: str, does: Callable[[], object], *, first: bool = False) -> Any:
+    """Make a button; the first of a page is the one that is meant."""
+    colour = "primary" if first else "default"
+    made = panel().widgets.Button(label=name, color=colour, min_width=110, align="end")
+    made.on_click(lambda _: does())
+    return made
+
+
+def save(name: str, content: bytes) -> Any:
+    """Make the button that saves what was made."""
+    return panel().widgets.FileDownload(
+        file=BytesIO(content), filename=name, label=f"Save {name}", color="success", width=190, align="end"
+    )
+
+
+def dropper(dropped: Callable[[str, bytes | str], object], most_mb: int, *, multiple: bool = False) -> Any:
+    """Make the place where files are dropped; each of them goes to `dropped` and is not kept here."""
+    made = panel().widgets.FileDropper(
+        multiple=multiple, max_file_size=f"{most_mb}MB", previews=[], sizing_mode="stretch_width", stylesheets=[_DROP]
+    )
+
+    def taken(_: Any) -> None:
+        arrived = dict(made.value)
+        made.value.clear()
+        for name, content in arrived.items():
+            dropped(name, content)
+
+    made.param.watch(taken, "value")
+    return made
+
+
+def pre(lines: str) -> str:
+    """Write lines as they stand."""
+    return f"<pre>{escape(lines)}</pre>"
+
+
+def text(line: str, kind: str = "") -> str:
+    """Write a line of text as HTML."""
+    return f"<p class='{kind}'>{escape(line)}</p>"
+
+
+def badge(verdict: str) -> str:
+    """Write a verdict on its colour."""
+    return f"<span class='badge {_BADGES.get(verdict, 'open')}'>{escape(verdict)}</span>"
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """Write a table; cells are HTML, heads are text."""
+    heads = [escape(each) for each in columns]
+
+    def cell(tag: str, place: int, content: str) -> str:
+        title = f" title='{heads[place]}'" if tag == "td" else ""
+        return f"<{tag}{' class=n' if place in numbers else ''}{title}>{content}</{tag}>"
+
+    head = "".join(cell("th", place, each) for place, each in enumerate(heads))
+    body = "".join(f"<tr>{''.join(cell('td', k, each) for k, each in enumerate(row))}</tr>" for row in rows)
+    return f"<div class=wide><table><tr>{head}</tr>{body}</table></div>"
+
+
+def number(value: Any, form: str = ".4g") -> str:
+    """Write a number; a dash for none."""
+    return "–" if value is None or value != value else format(float(value), form)
+
+
+class Form:
+    """Fields of numbers and choices; one that is left empty keeps what its placeholder shows.
+
+    Parameters
+    ----------
+    fields : mapping of str to (str, str)
+        Label with unit by name, and what holds where it is empty.
+    choices : mapping of str to mapping of str to object
+        Options of a field that is chosen.
+    """
+
+    def __init__(
+        self, fields: Mapping[str, tuple[str, str]], choices: Mapping[str, Mapping[str, Any]] | None = None
+    ) -> None:
+        widgets, choices = panel().widgets, choices or {}
+        self.widgets: dict[str, Any] = {}
+        for name, (label, placeholder) in fields.items():
+            if name in choices:
+                made = widgets.Select(label=label, options=dict(choices[name]), width=200)
+            elif placeholder.startswith("text"):
+                made = widgets.TextInput(label=label, placeholder=placeholder.removeprefix("text").strip(), width=200)
+            else:
+                made = widgets.FloatInput(label=label, value=None, placeholder=placeholder, width=200)
+            self.widgets[name] = made
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """What was given, by name."""
+        given = {name: widget.value for name, widget in self.widgets.items()}
+        return {name: value for name, value in given.items() if value not in (None, "")}
+
+    def show(self, values: Mapping[str, Any]) -> None:
+        """Write values into the fields; the others are empty."""
+        for name, widget in self.widgets.items():
+            widget.value = values.get(name, None if hasattr(widget, "step") else "")
+
+    def hint(self, placeholders: Mapping[str, str]) -> None:
+        """Show what holds where nothing is given."""
+        for name, hint in placeholders.items():
+            self.widgets[name].placeholder = hint
+
+    def layout(self) -> Any:
+        """Set the fields side by side, as many as fit."""
+        return side(*self.widgets.values())
+
+
+class SameAs:
+    """The command and the Python that do what the view did."""
+
+    def __init__(self) -> None:
+        self._page = page()
+        self.script: Script | None = None
+        self.layout = card("The same as a command and in Python", self._page)
+
+    def show(self, script: Script) -> None:
+        """Show a script."""
+        self.script = script
+        self._page.object = pre(script.shell) + pre(script.python)
+
+
+class Work:
+    """One piece of work at a time, with its bar, a button that ends it, and the sentence where it fails."""
+
+    def __init__(self, *, stops: bool = False) -> None:
+        widgets = panel().widgets
+        self._bar = widgets.Progress(active=True, value=-1, sizing_mode="stretch_width", height=8, visible=False)
+        self._said = page()
+        self._button = button("Stop" if stops else "Cancel", self.leave)
+        self._button.visible = False
+        self._stops, self._job, self._ticks = stops, cast("Job | None", None), cast("Any", None)
+        self.layout = column(panel().Row(self._button, self._bar, sizing_mode="stretch_width"), self._said)
+
+    @property
+    def busy(self) -> bool:
+        """Whether something runs."""
+        return self._job is not None
+
+    def say(self, line: str, kind: str = "") -> None:
+        """Show a sentence."""
+        self._said.object = text(line, kind) if line else ""
+
+    def begin(
+        self,
+        what: str,
+        function: Callable[..., Any],
+        *given: Any,
+        done: Callable[[Any], None],
+        told: Callable[[list[Any]], None] | None = None,
+        failed: Callable[[str], None] | None = None,
+        seconds: float = float("inf"),
+    ) -> None:
+        """Begin; what ran before is ended."""
+        self.end("another one was begun")
+        self.say(what)
+        self._bar.visible = self._button.visible = True
+        self._job = Job(function, given, seconds=seconds)
+        self._what, self._done, self._told, self._failed = what, done, told, failed
+        self._ticks = panel().state.add_periodic_callback(self.look, _TICK_MS, start=panel().state.curdoc is not None)
+
+    def look(self) -> None:
+        """Take what the work has reported, and its end."""
+        job = self._job
+        if job is None:
+            return
+        told = job.look()
+        if told and self._told is None:
+            self.say(f"{self._what}: {told[-1]}")
+        elif told and self._told is not None:
+            self._told(told)
+        if job.over:
+            self._leave()
+            self.say(job.error, "bad" if job.error else "")
+            if job.error and self._failed is not None:
+                self._failed(job.error)
+            elif not job.error:
+                self.say("stopped: what is finished is shown" if job.interrupted else "")
+                self._shown(job.result)
+
+    def _shown(self, result: Any) -> None:
+        try:
+            self._done(result)
+        except Error as error:
+            self.say(str(error), "bad")
+
+    def leave(self) -> None:
+        """Stop with what is finished where the work can, else end it."""
+        if self._job is not None and self._stops:
+            self._job.stop()
+        else:
+            self.end("cancelled")
+
+    def end(self, why: str = "the window was closed") -> None:
+        """End what runs."""
+        if self._job is not None:
+            self._job.end(why)
+            self.look()
+
+    def _leave(self) -> None:
+        self._job = None
+        self._bar.visible = self._button.visible = False
+        if self._ticks is not None and self._ticks.running:
+            self._ticks.stop()

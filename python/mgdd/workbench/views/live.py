@@ -1,0 +1,42 @@
+"""Live: a run, a record or a simulated throttle, as `mgdd rig watch` shows it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mgdd.errors import Error
+from mgdd.rig import watch
+from mgdd.workbench.parts import button, column, page, panel, side, text
+
+
+class Live:
+    """The last page; its server is a process of its own, which ends with the window."""
+
+    title = "Live"
+
+    def __init__(self) -> None:
+        self.source = panel().widgets.TextInput(
+            label="folder of a run, a record, or simulate", value="simulate", width=320, align="end"
+        )
+        self._shown = page()
+        self._page: Any = None
+        self.layout = column(
+            page(text("The page of mgdd rig watch: it reads, and its stop button opens the bridge.", "quiet")),
+            side(self.source, button("Watch", self.watch, first=True)), self._shown,
+        )  # fmt: skip
+
+    def watch(self) -> None:
+        """Open the page of a source."""
+        self.close()
+        try:
+            self._page = watch(self.source.value or "simulate")
+        except (Error, ImportError) as error:
+            self._shown.object = text(str(error), "bad")
+            return
+        self._shown.object = self._page._repr_html_()
+
+    def close(self) -> None:
+        """End the server of the page."""
+        if self._page is not None:
+            self._page.close()
+            self._page = None

@@ -1,0 +1,17 @@
+"""What the process that forks all work has imported before: one cycle is simulated, checked and drawn by it."""
+
+from __future__ import annotations
+
+import threading
+
+import scipy.signal
+import scipy.stats  # noqa: F401 - half of the time of the first analysis
+
+from mgdd import engine, identify, plot  # noqa: F401 - modules come on use
+from mgdd.workbench import work  # noqa: F401 - what is forked finds it here
+
+_CYCLE = engine.simulate("puma_single")
+engine.check_pressure(_CYCLE, "puma_single")
+plot.pressure(_CYCLE).figure.canvas.draw()
+if threading.active_count() > 1:
+    raise RuntimeError("threads do not survive a fork: warm up with less")
