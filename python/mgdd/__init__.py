@@ -4,8 +4,8 @@ The modules: `mgdd.engine` (cycle model and trace analysis), `mgdd.throttle` (el
 (calibration, throttle logs), `mgdd.guide` (models that guide a seeker), `mgdd.optimize` (least squares, seekers,
 iterative learning), `mgdd.control` (PID, sliding mode), `mgdd.loop` (virtual bench, closed loops), `mgdd.sweep` (many
 cycles at once), `mgdd.design` (design of experiments), `mgdd.maps` (look-up tables), `mgdd.parallel` (executors),
-`mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.report`, `mgdd.results` and
-`mgdd.errors`. They are imported on use.
+`mgdd.rig` (test rigs), `mgdd.workbench` (pages in a browser), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`,
+`mgdd.report`, `mgdd.results` and `mgdd.errors`. They are imported on use.
 
 Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA aTDC).
 """
@@ -42,6 +42,7 @@ __all__ = [
     "surrogate",
     "sweep",
     "throttle",
+    "workbench",
 ]
 
 

@@ -101,13 +101,29 @@ class Browser:
 
     def click(self, label: str) -> None:
         """Press and release the mouse in the middle of a button, as a hand does."""
-        self._press(
-            f"{_DEEP}.find((one) => one.localName == 'button' && one.innerText.includes({json.dumps(label)}) && "
-            "one.getBoundingClientRect().width > 0)"
+        self._press(self.button(label))
+
+    def button(self, label: str) -> str:
+        """Write the search of a button, or of a link that looks like one."""
+        return (
+            f"{_DEEP}.find((one) => ['button', 'a'].includes(one.localName) && "
+            f"one.innerText.includes({json.dumps(label)}) && one.getBoundingClientRect().width > 0)"
+        )
+
+    def count(self, name: str) -> int:
+        """Count the elements of a kind."""
+        return self.evaluate(f"{_DEEP}.filter((one) => one.localName == {json.dumps(name)}).length")
+
+    def shown_beside(self, text: str) -> str:
+        """Give the badge in the row of a table or list that begins with a text; empty where there is none."""
+        return self.evaluate(
+            f"(() => {{ const row = {_DEEP}.find((one) => ['b', 'td'].includes(one.localName) && "
+            f"one.innerText == {json.dumps(text)}); const own = row && row.parentElement.querySelector('.badge'); "
+            "return own ? own.innerText : ''; })()"
         )
 
     def _press(self, element: str) -> None:
-        box, until = None, time.monotonic() + 30.0
+        box, until = None, time.monotonic() + 120.0
         while box is None and time.monotonic() < until:
             box = self.evaluate(
                 f"(() => {{ const own = {element}; own.scrollIntoViewIfNeeded(); const box = "
@@ -126,22 +142,24 @@ class Browser:
         self.call("DOM.setFileInputFiles", files=[str(file) for file in files], objectId=handle)
 
     def choose(self, label: str, option: str) -> None:
-        """Choose an option of the list with that label."""
-        self.evaluate(
+        """Choose an option of the list with that label, once it is there."""
+        change = (
             f"(() => {{ const own = {_labelled(label, 'select')}; own.value = [...own.options].find((one) => "
-            f"one.text == {json.dumps(option)}).value; own.dispatchEvent(new Event('change')); }})()"
+            f"one.text == {json.dumps(option)}).value; own.dispatchEvent(new Event('change')); return true; }})()"
         )
-
-    def enter(self, label: str, text: str) -> None:
-        """Type into the field with that label, over what stands there."""
-        self.evaluate(f"(() => {{ const own = {_labelled(label, 'input')}; own.focus(); own.select(); }})()")
-        self.call("Input.insertText", text=text)
-        self.evaluate(f"{_labelled(label, 'input')}.blur()")
+        until = time.monotonic() + 30.0
+        while not self.evaluate(change):
+            assert time.monotonic() < until, label
+            time.sleep(0.1)
 
     def tab(self, title: str) -> None:
         """Click on the head of a tab."""
         self._press(f"{_DEEP}.find((one) => one.className == 'bk-tab' || one.className == 'bk-tab bk-active' ? "
                     f"one.innerText.trim() == {json.dumps(title)} : false)")  # fmt: skip
+
+    def saves_into(self, folder: Path) -> None:
+        """Let downloads go into a folder."""
+        self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
 
     def loaded(self) -> list[str]:
         """Give the addresses of all that the page has asked for."""

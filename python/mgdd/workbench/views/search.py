@@ -183,6 +183,8 @@ class Search:
     def done(self, found: dict[str, Any]) -> None:
         """Show what was found, and the estimate over all cycles of this part."""
         self.found, self._state = found, found["state"]
+        if found["result"]["interrupted"]:
+            self.work.say(f"stopped after {self.done_cycles} cycles: Resume goes on")
         data: xr.Dataset = found["dataset"]
         first = self.done_cycles - data.sizes["cycle"]
         for name in self.inputs.values:
