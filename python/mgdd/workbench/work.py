@@ -91,9 +91,9 @@ class Watched:
 
     def measure(self) -> Any:
         """Measure a cycle, and report it."""
+        time.sleep(self._pause_s)  # before it: a stop in the pause loses no reading
         measured = self.plant.measure()
         self._watch((self._inputs | dict(measured.applied), measured.performance, dict(measured.limits)))
-        time.sleep(self._pause_s)
         return measured
 
 

@@ -123,15 +123,15 @@ class Browser:
         )
 
     def _press(self, element: str) -> None:
-        box, until = None, time.monotonic() + 120.0
-        while box is None and time.monotonic() < until:
-            box = self.evaluate(
-                f"(() => {{ const own = {element}; own.scrollIntoViewIfNeeded(); const box = "
-                "own.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; })()"
-            )
-            if box is None:  # it is not there yet
-                time.sleep(0.1)
-        assert box is not None, element
+        middle = (
+            f"(() => {{ const own = {element}; own.scrollIntoViewIfNeeded(); const box = own.getBoundingClientRect(); "
+            "return own.disabled ? null : [box.x + box.width / 2, box.y + box.height / 2]; })()"
+        )
+        box, before, until = None, None, time.monotonic() + 120.0
+        while box is None or box != before:  # it is not there yet, or moves
+            assert time.monotonic() < until, element
+            time.sleep(0.1)
+            box, before = self.evaluate(middle), box
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
 

@@ -91,8 +91,8 @@ class Cycles:
         if not shown:
             return
         first = next(iter(shown.values()))
-        names = [name for name in _FIRST if name in first and first[name].dims == ("cycle",)]
-        names += [str(name) for name, v in first.data_vars.items() if v.dims == ("cycle",) and name not in names]
+        known = [str(name) for name, v in first.data_vars.items() if v.dims == ("cycle",) and v.notnull().any()]
+        names = [*(name for name in _FIRST if name in known), *(name for name in known if name not in _FIRST)]
         options = {f"{label_of(first[name]).long_name} [{label_of(first[name]).units}]": name for name in names}
         if self.figure.options != options:
             self.figure.options = options

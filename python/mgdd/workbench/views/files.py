@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from mgdd.workbench.parts import (
 )
 from mgdd.workbench.pictures import side_by_side, traces
 from mgdd.workbench.session import MOST_FILE_MB, Loaded, Session, engines
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 _NOT_STATED = "– state the engine –"
@@ -80,7 +83,7 @@ class Files:
         self.which = widgets.Select(label="file", options=[], width=260)
         self.which.param.watch(lambda _: self.chosen(), "value")
         self._guesses, self._table = page(), page()
-        self._picture = column()
+        self._picture, self._drawn = column(), cast("xr.Dataset | None", None)
         self.layout = column(
             page("<h2>Drop pressure files</h2>" + text(
                 f"Any format that mgdd reads; up to {MOST_FILE_MB} MB each. Nothing leaves this machine.", "quiet")),
@@ -153,13 +156,13 @@ class Files:
         self.work.begin(f"reading {one.path.name}", work.checked, script, done=done, failed=failed, seconds=READ_S)
 
     def _ended(self, one: Loaded) -> None:
-        name = one.path.name
-        if name in self.session.files:
-            self.which.options = list(self.session.files)
-            if self.which.value not in self.session.files or len(self.session.files) == 1:
-                self.which.value = name
         self.work.say("")
-        self.show()
+        name = one.path.name
+        self.which.options = list(self.session.files)
+        if name in self.session.files and self.file is None:
+            self.which.value = name  # which shows it
+        else:
+            self.show()
         self._next()
 
     def chosen(self) -> None:
@@ -176,8 +179,12 @@ class Files:
         self._guesses.object = self._guessed()
         self._table.object = self._rows()
         one = self.file
-        drawn = {} if one is None or one.trace is None else {one.path.name: one.trace}
-        self._picture.objects = [side_by_side(traces(drawn, "pressure_bar"))] if drawn else []
+        trace = None if one is None else one.trace
+        if one is not None and trace is not None and trace is not self._drawn:
+            self._picture.objects = [side_by_side(traces({one.path.name: trace}, "pressure_bar"))]
+        elif trace is None:
+            self._picture.objects = []
+        self._drawn = trace
         if one is not None:
             self.same.show(self.session.check_script(one))
         self._changed()

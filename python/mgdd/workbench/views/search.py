@@ -105,7 +105,7 @@ class Search:
         self._state: Any = None
         self._said, self._pictures = page(), column()
         self._sources: dict[str, Any] = {}
-        self.done_cycles = 0
+        self.done_cycles = self._first = 0  # first cycle of what runs now
         self.layout = column(
             page(text("A virtual engine: nothing here can drive a bench.", "quiet")),
             side(self.engine, self.seeker, self.guide, self.wall_heat, self.cycles, self.seed, self.pace),
@@ -134,7 +134,7 @@ class Search:
         """Seek from the start."""
         script = self.script()
         self.same.show(script)
-        self._state, self.done_cycles = None, 0
+        self._state, self.done_cycles, self._first = None, 0, 0
         self._prepare()
         self._run(script)
 
@@ -183,10 +183,11 @@ class Search:
     def done(self, found: dict[str, Any]) -> None:
         """Show what was found, and the estimate over all cycles of this part."""
         self.found, self._state = found, found["state"]
+        data: xr.Dataset = found["dataset"]
+        first = self._first
+        self.done_cycles = self._first = first + data.sizes["cycle"]
         if found["result"]["interrupted"]:
             self.work.say(f"stopped after {self.done_cycles} cycles: Resume goes on")
-        data: xr.Dataset = found["dataset"]
-        first = self.done_cycles - data.sizes["cycle"]
         for name in self.inputs.values:
             estimate = np.asarray(data["estimate"].sel(input=name))
             self._sources[f"estimate {name}"].stream({"x": np.arange(first, first + len(estimate)), "y": estimate})
