@@ -152,14 +152,18 @@ class Form:
 
     @property
     def values(self) -> dict[str, Any]:
-        """What was given, by name."""
+        """What was given, by name; a text of digits is a number, of a column."""
         given = {name: widget.value for name, widget in self.widgets.items()}
-        return {name: value for name, value in given.items() if value not in (None, "")}
+        return {
+            name: int(value) if str(value).isdigit() else value
+            for name, value in given.items()
+            if value not in (None, "")
+        }
 
     def show(self, values: Mapping[str, Any]) -> None:
         """Write values into the fields; the others are empty."""
         for name, widget in self.widgets.items():
-            widget.value = values.get(name, None if hasattr(widget, "step") else "")
+            widget.value = values.get(name) if hasattr(widget, "step") else str(values.get(name, ""))
 
     def hint(self, placeholders: Mapping[str, str]) -> None:
         """Show what holds where nothing is given."""

@@ -25,7 +25,7 @@ MEAN = Call("mean", ("cycle",), {"keep_attrs": True}, of=Named("trace"))
 PEGGING = ("pegging", "pegging_exponent", "inlet_pressure_kpa")
 
 
-@dataclass
+@dataclass(eq=False)
 class Loaded:
     """A file of the session.
 

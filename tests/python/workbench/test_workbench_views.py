@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,18 @@ def test_cycles_are_saved(drifted: Any, what: str, name: str, holds: bytes) -> N
     save = drifted.cycles.saved.objects[0]
     assert save.filename == name
     assert holds in save.file.getvalue()
+
+
+def test_a_column_is_given_by_name_or_number(bench: Any, record: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bench.files.engine.value = ENGINE
+    bench.files.reading.widgets["pressure_column"].value = "2"
+    bench.files.add(record.name, record.read_bytes())
+    assert bench.files.file.options == {"pressure_column": 2}
+    assert bench.files.file.trace["pressure_bar"].dims == ("crank_angle_cad",)
+    asked = run_command(bench.check.same.script.shell, capsys)["files"][0]
+    assert asked["verdict"] == bench.files.file.check.verdict
+    bench.files.add(record.name, record.read_bytes())  # again: it takes the place of the first
+    assert list(bench.session.files) == [record.name]
 
 
 def test_files_are_drawn_over_each_other(drifted: Any, record: Path) -> None:
@@ -305,5 +318,5 @@ def test_names_and_errors_with_markup_are_shown_as_they_are(bench: Any, record: 
 
 def test_a_source_that_is_none_is_named(bench: Any) -> None:
     bench.live.source.value = "/no/such/folder"
-    bench.live.watch()
+    asyncio.run(bench.live.opened())
     assert "no such folder or record" in bench.live._shown.object

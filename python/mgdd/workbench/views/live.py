@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 from mgdd.errors import Error
@@ -26,10 +27,15 @@ class Live:
         )  # fmt: skip
 
     def watch(self) -> None:
-        """Open the page of a source."""
+        """Open the page of a source, while this one goes on."""
         self.close()
+        self._shown.object = text("opening")
+        panel().state.execute(self.opened)
+
+    async def opened(self) -> None:
+        """Wait for the server of the page, and show it."""
         try:
-            self._page = watch(self.source.value or "simulate")
+            self._page = await asyncio.to_thread(watch, self.source.value or "simulate")
         except (Error, ImportError) as error:
             self._shown.object = text(str(error), "bad")
             return

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 from mgdd import presets
+from mgdd.errors import ParameterError
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, Named, Script
 from mgdd.workbench.parts import Form, SameAs, Work, button, column, number, page, panel, side, table, text
@@ -87,7 +88,11 @@ class Timing:
             names = ", ".join(other)
             self.work.say(f"{names}: read or pegged otherwise than {first.path.name}: take them apart", "bad")
             return
-        script = self.script()
+        try:
+            script = self.script()
+        except ParameterError as error:  # a geometry that is none
+            self.work.say(str(error), "bad")
+            return
         self.same.show(script)
         self.work.begin("calibrating; about a minute", work.timed, script, done=self.answer)
 
