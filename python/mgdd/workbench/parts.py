@@ -32,7 +32,7 @@ pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel-su
   tr { border-bottom: 1px solid var(--panel-border-color); } }
 .check b { display: inline-block; min-width: 9em; }
 """
-_DROP = ".filepond--panel > * { background: var(--panel-surface-color) !important; }"
+_DROP = ".filepond--panel-root, .filepond--panel-root > * { background: var(--panel-surface-color) !important; }"
 _BADGES = {"no fault found": "good", "open": "open", "doubt": "doubt", "fail": "fail"}
 
 

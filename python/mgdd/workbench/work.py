@@ -31,10 +31,15 @@ def run(watch: Watch, script: Script) -> dict[str, Any]:
     return script.run(watch)
 
 
-def checked(_: Watch, script: Script) -> dict[str, Any]:
-    """Read a file, and check it where the script does; of the trace come as many cycles and angles as are drawn."""
-    found = script.run()
-    return found | {"trace": thinned(found["trace"])}
+def checked(watch: Watch, script: Script) -> dict[str, Any]:
+    """Read a file, report its trace as it is drawn, and check it where the script does."""
+
+    def read(trace: xr.Dataset) -> xr.Dataset:
+        watch(thinned(trace))
+        return trace
+
+    found = script.run(wraps={"trace": read})
+    return {name: result for name, result in found.items() if name != "trace"}
 
 
 def analyzed(_: Watch, script: Script) -> dict[str, Any]:

@@ -92,7 +92,7 @@ class Files:
             card("Geometry, where it is not that of the named engine", self.cylinder.layout()),
             card("Operating point", self.point.layout(), collapsed=False),
             card("How the files are to be read", self.reading.layout()),
-            button("Read again with these", self.apply, first=True),
+            side(button("Read again with these", self.apply, first=True)),
         )  # fmt: skip
         self.show()
 
@@ -143,27 +143,34 @@ class Files:
             return
         one = self._waiting.pop(0)
 
+        def told(traces: list[Any]) -> None:
+            one.trace, one.check, one.error = traces[-1], None, ""
+            self._arrived(one)
+
         def done(found: Any) -> None:
-            one.trace, one.check, one.error = found["trace"], found.get("check"), ""
-            self._ended(one)
+            one.check = found.get("check")
+            self._arrived(one)
+            self._next()
 
         def failed(why: str) -> None:
             one.trace = one.check = None
             one.error = why.replace(f"{self.session.folder}/", "")
-            self._ended(one)
+            self.work.say("")
+            self._arrived(one)
+            self._next()
 
-        script = self.session.check_script(one)
-        self.work.begin(f"reading {one.path.name}", work.checked, script, done=done, failed=failed, seconds=READ_S)
+        self.work.begin(
+            f"reading {one.path.name}", work.checked, self.session.check_script(one),
+            done=done, told=told, failed=failed, seconds=READ_S,
+        )  # fmt: skip
 
-    def _ended(self, one: Loaded) -> None:
-        self.work.say("")
+    def _arrived(self, one: Loaded) -> None:
         name = one.path.name
         self.which.options = list(self.session.files)
         if name in self.session.files and self.file is None:
             self.which.value = name  # which shows it
         else:
             self.show()
-        self._next()
 
     def chosen(self) -> None:
         """Show how the chosen file is read."""
