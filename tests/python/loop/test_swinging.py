@@ -70,5 +70,6 @@ def test_own_plants_and_many_runs_are_judged_alike(caplog: pytest.LogCaptureFixt
     runs = track_many({"pid": tuned_controller("pid", "P1")}, ["step:20:60", "step:40:42"], ["P1", "P2"], **how)
     assert runs.attrs["findings"].startswith("4 of 4 runs swing")
     assert "findings" not in track_many({"pid": tuned_controller("pid", "P1")}, ["step:20:60"], ["P1"]).attrs
-    main(["throttle", "track", "--controller", "pid", "--reference", "step:20:60", "--delay-samples", "12"])
+    strong = ["--plant-scale", "resistance_ohm=0.2", "--delay-samples", "12"]  # which the controller is not told
+    main(["throttle", "track", "--controller", "pid", "--reference", "step:20:60", *strong])
     assert "the plate swings by" in caplog.text
