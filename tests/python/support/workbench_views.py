@@ -38,7 +38,6 @@ class InlineJob:
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     """All views of a window; what they begin is over when `begin` returns."""
-    pytest.importorskip("panel")
     from mgdd.workbench import parts
     from mgdd.workbench.page import Bench
 

@@ -5,14 +5,20 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mgdd.io import throttle_log, write_csv
+from mgdd.cli import main
+from mgdd.engine import simulate
+from mgdd.errors import ParameterError
+from mgdd.io import extras, throttle_log, write_csv
+from mgdd.loop import VirtualEngine, seek, track, tuned_controller
 from mgdd.signals import chirp
 from mgdd.throttle import Throttle, simulate_throttle
+from mgdd.workbench import view
 from pressure_files import CYCLES, FULL, writer_in
 from workbench_views import bench, run_command, run_python, said
 
@@ -314,6 +320,39 @@ def test_names_and_errors_with_markup_are_shown_as_they_are(bench: Any, record: 
         assert "<img" not in part.object
         assert "<script" not in part.object
     assert "&lt;img" in bench.files._table.object
+
+
+def test_without_panel_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def missing(module: str) -> None:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    monkeypatch.setattr(extras, "importlib", SimpleNamespace(import_module=missing))
+    assert main(["workbench", "--no-browser"]) == 2
+    assert 'pip install "mgdd[workbench]"' in capsys.readouterr().err
+    with pytest.raises(ImportError, match=r"mgdd\[workbench\]"):
+        view(simulate("puma_single"))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: simulate("puma_single"),
+        lambda: seek(VirtualEngine(seed=1), {"soc_cad": (-20.0, 5.0)}, cycles=20),
+        lambda: track(tuned_controller("pid"), "step:40:42"),
+    ],
+)
+def test_results_are_shown_in_a_notebook(made: Any) -> None:
+    which, drawn = view(made())
+    for name in which.options:
+        which.value = name
+        assert drawn[0].object is not None, name
+
+
+def test_what_has_nothing_to_draw_is_refused_in_a_notebook() -> None:
+    with pytest.raises(ParameterError, match="must be a result of mgdd or a Dataset"):
+        view(3.0)
+    with pytest.raises(ParameterError, match="has nothing over"):
+        view(simulate("puma_single")[["p_max_bar"]])
 
 
 def test_a_source_that_is_none_is_named(bench: Any) -> None:
