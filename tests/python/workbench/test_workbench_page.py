@@ -247,7 +247,7 @@ def test_hostile_files_are_a_sentence_and_the_page_lives(page: Browser, drifted:
     assert page.evaluate("document.title") == "mgdd workbench"
     assert page.evaluate("document.querySelectorAll('img[src=x]').length") == 0
     page.upload(drifted)
-    assert becomes(lambda: page.shown_beside("drifted.csv").startswith("doubt"))
+    assert becomes(lambda: page.shown_beside("drifted.csv").startswith("doubt"), 180.0)
 
 
 @needs_chromium
