@@ -52,6 +52,13 @@ CHAIN = throttle.DemandChain()
 FUEL, TIMING = np.array([6.0, 20.0, 40.0]), np.array([-2.0, -6.0, -11.0])
 
 
+def fitted(time: Any, u: Any, y: Any, start: Any) -> Any:
+    parameters = {"gain": 100.0, "lag_s": 0.1}
+    options = optimize.FitOptions(max_iterations=2)
+    record = {"time_s": time, "u": u, "y": y}
+    return identify.fit_ode(lag, record, parameters=parameters, initial_state=start, options=options).report.values
+
+
 def stepped(time: Any, u: Any, y: Any, start: Any) -> Any:
     model = identify.DiscreteModel(
         step=lambda x, u, p: p[0] * x + p[1] * u[0], parameters={"pole": 0.9, "gain": 10.0}, initial_state=(0.0,)
@@ -213,6 +220,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "guide.OnlineCalibration.offer": (calibrated, (pressure(),)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_model": (stepped, (TIME, DUTY, ANGLE, np.array([8.0]))),
+    "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "io.Encoder.angle": (wheel, (np.arange(0.0, 0.4, 1e-3), np.sin(200.0 * np.arange(0.0, 0.4, 1e-3)))),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
