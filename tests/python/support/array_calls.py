@@ -52,6 +52,10 @@ CHAIN = throttle.DemandChain()
 FUEL, TIMING = np.array([6.0, 20.0, 40.0]), np.array([-2.0, -6.0, -11.0])
 
 
+def lag(_: float, x: Any, u: Any, p: Any) -> Any:
+    return (p[0] * u[0] - x) / p[1]
+
+
 def fitted(time: Any, u: Any, y: Any, start: Any) -> Any:
     parameters = {"gain": 100.0, "lag_s": 0.1}
     options = optimize.FitOptions(max_iterations=2)
@@ -71,11 +75,11 @@ def stepped(time: Any, u: Any, y: Any, start: Any) -> Any:
 
 def ode(time: Any, u: Any, start: Any) -> Any:
     parameters = {"gain": 100.0, "lag_s": 0.1}
-    lag = identify.OdeModel(
-        derivative=lambda _, x, u, p: (p[0] * u[0] - x) / p[1], output=lambda x, *_: x[0], parameters=parameters,
+    model = identify.OdeModel(
+        derivative=lag, output=lambda x, *_: x[0], parameters=parameters,
         initial_state=(0.0,),
     )  # fmt: skip
-    return lag.simulate({"time_s": time, "u": u}, initial_state=start)["y"].to_numpy()
+    return model.simulate({"time_s": time, "u": u}, initial_state=start)["y"].to_numpy()
 
 
 def indicating(angle: Any) -> Indicating:
