@@ -214,35 +214,3 @@ def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(Interrupted, match="no model was finished") as stop:
         best_timing(datasets.read("hd_diesel_128x144")[:1], HD)
     assert stop.value.partial is None
-
-
-def ends(pair: list[float], form: str) -> str:
-    return f"{pair[0]:{form}} to {pair[1]:{form}}"
-
-
-def test_table_of_the_demo(root: Path) -> None:
-    table = (
-        (root / "docs" / "tour.md")
-        .read_text(encoding="utf-8")
-        .split("<!-- numbers: demo -->")[1]
-        .split("<!-- end numbers -->")[0]
-    )
-    written = [line for line in table.splitlines() if re.match(r"\| \d+ %", line)]
-    summary = quick_study("measured-traces").summary
-    computed = []
-    for load, row in zip((25, 50, 75, 100), summary["traces"], strict=True):
-        best, fit = row["best_timing"], row["calibrated"]
-        cells = (
-            f"{best['best'][name]:{form}} ({ends(best[name], form)})"
-            for name, form in (
-                ("free_ca50_cad", ".1f"),
-                ("free_shift_cad", "+z.1f"),
-                ("free_gain_percent", ".2f"),
-                ("shift_cad", "+z.1f"),
-                ("gain_percent", ".2f"),
-            )
-        )
-        computed.append(
-            f"| {load} % | {fit['rmse_percent']:.2f} | {fit['imep_closed_error_percent']:+.1f} | {' | '.join(cells)} |"
-        )
-    assert written == computed
