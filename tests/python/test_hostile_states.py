@@ -15,7 +15,7 @@ import pytest
 from public_objects import public_objects, saved_state
 
 HOSTILE = (-1.0, -1e9 - 3, 4e15, 3e5 + 1, 2.0**53, 17.5, -(2.0**53), 1e300)
-WHOLE_S = 300.0  # of the processor for the states of one class in its child process: a loaded machine is no fault
+WHOLE_S = 300.0  # of the processor for the states of one class: time that a loaded machine adds does not count
 
 
 def runs() -> dict[str, Any]:

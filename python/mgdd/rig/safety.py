@@ -65,10 +65,10 @@ def _entries() -> dict[str, Wanted]:
     return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
 
 
-def knowing(controller: _Made, envelope: SafetyEnvelope) -> _Made:
-    """Give a controller that learns from its duties the bounds of the gate behind it, others as they are.
+def bounded_by(controller: _Made, envelope: SafetyEnvelope) -> _Made:
+    """Give a controller that learns the bounds of the gate behind it to plan with, others as they are.
 
-    What the gate clamps or slews without its knowledge looks like a delay to it, and it moves the plate about at rest.
+    `set_sent` says what left; a slew of 12/s that is not planned with settles a step in twice the time.
     """
     if not isinstance(controller, GuidedPredictive) or not controller.settings["friction_learning"]:
         return controller

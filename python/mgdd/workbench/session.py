@@ -84,7 +84,7 @@ class Session:
         raw = content.encode() if isinstance(content, str) else content
         own = "".join(c if c.isprintable() else "_" for c in Path(name.replace("\\", "/")).name).strip()
         if not own.strip(".") or len(own.encode()) > _LONGEST_NAME:
-            raise DataError(f"{own[:40]!r} is no name for a file: rename it")
+            raise DataError(f"{own[:40]!r} cannot be the name of a file here: rename it")
         held = sum(one.path.stat().st_size for key, one in self.files.items() if key != own)
         if len(raw) > MOST_FILE_MB << 20 or held + len(raw) > MOST_FILES_MB << 20:
             raise DataError(

@@ -155,10 +155,11 @@ def test_a_fit_far_below_its_noise_ceiling_is_doubted(p1: Throttle) -> None:
     good = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
     assert good.train.nrmse_fit_percent > 98.0
     assert "below_ceiling" not in {found.code for found in good.findings}
-    # Where the test log holds what the first did not, that one decides.
-    other = measured(p1.replace(coulomb_nm=1.25 * p1.coulomb_nm), swing())
+    # Where the test log holds what the first did not, that one decides; a loss of ten points has a finding of its own.
+    other = measured(p1.replace(coulomb_nm=1.03 * p1.coulomb_nm), swing())
     tested = identify_throttle(log, "first_principle", test=other, options=FitOptions(n_starts=1))
-    said = [str(found) for found in tested.findings if found.code == "below_ceiling"]
+    assert 3.0 < tested.train.nrmse_fit_percent - tested.test.nrmse_fit_percent < 10.0
+    said = [str(found) for found in tested.findings if found.code in ("below_ceiling", "overfitted")]
     assert len(said) == 1
     assert f"meets the test log at {tested.test.nrmse_fit_percent:.1f} %" in said[0]
 

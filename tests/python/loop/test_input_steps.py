@@ -91,9 +91,9 @@ def test_a_seeker_of_ones_own_is_told_the_step_that_was_set() -> None:
 @pytest.mark.parametrize(
     ("bounds", "value", "nearest"),
     [
-        ((0.0, 10.0, 3.0), 10.0, 9.0),  # the bound is no step
+        ((0.0, 10.0, 3.0), 10.0, 9.0),  # the bound is not on a step
         ((0.0, 0.3, 0.1), 0.3, 0.3),  # it is one, but for rounding
-        ((-math.inf, 10.0, 4.0), -5.0, -4.0),  # multiples where there is no lower bound
+        ((-math.inf, 10.0, 4.0), -5.0, -4.0),  # multiples of the step, without a lower bound
         ((-3.0, math.inf, 2.0), 6.9, 7.0),
         ((0.0, 10.0, 0.0), 3.21, 3.21),
     ],

@@ -1,16 +1,19 @@
 """Sweeps whose optima are known in closed form: uneven axes, another optimum, bend and limit in every cell."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from mgdd.maps import CalibrationMap
+from mgdd.maps import CalibrationMap, read_map
 from mgdd.results.labels import labelled_dataset
 
 SPEED = np.array([900.0, 1400.0, 3000.0])
 FUEL = np.array([6.0, 10.0, 14.0, 25.0, 40.0])
 SOC = np.concatenate([np.arange(-24.0, -6.0, 0.5), np.arange(-6.0, 9.0, 0.4)])  # uneven
+VALUES = np.arange(15.0).reshape(3, 5) + 0.25  # nothing of it is symmetric
+AXES = {"speed_rpm": SPEED, "fuel_mg": FUEL}
 
 
 def centre(speed: Any, fuel: Any) -> Any:
@@ -65,3 +68,14 @@ def timing_table() -> CalibrationMap:
         },
         provenance={"from": 'bench run 7, "second half"', "date": "2024-05-17", "remark": "größer, kälter"},
     )  # fmt: skip
+
+
+def read(text: str | bytes, folder: Path, called: str = "map.txt", **options: Any) -> CalibrationMap:
+    """Read a text as a file, which stays as it is."""
+    file = folder / called
+    raw = text.encode() if isinstance(text, str) else text
+    file.write_bytes(raw)
+    try:
+        return read_map(file, **options)
+    finally:
+        assert file.read_bytes() == raw

@@ -193,8 +193,8 @@ def identify_throttle(
         stops_deg=(closed_deg, open_deg), options=options,
     )  # fmt: skip
     tested = None if test is None else quality_of([free_run(fit.model, test)])
-    beyond: tuple[Finding, ...] = ()
-    if test is not None and all(finding.code != "below_ceiling" for finding in fit.findings):
+    beyond = _carried_over(fit.train, tested)
+    if test is not None and not beyond and all(finding.code != "below_ceiling" for finding in fit.findings):
         beyond = below_ceiling([test], tested, "the test log")
     prior = prior_of(fit.model)
     home = prior.limp_home_deg if estimated or limp_home is None else limp_home
@@ -208,7 +208,7 @@ def identify_throttle(
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
     against = moves_against(time, duty, angle, (closed_deg, open_deg))
-    findings = unique((*against, *of_fit, *_carried_over(fit.train, tested), *beyond, *read, *stops, *questions))
+    findings = unique((*against, *of_fit, *beyond, *read, *stops, *questions))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 

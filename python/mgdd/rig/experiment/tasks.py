@@ -25,7 +25,7 @@ from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.rig.experiment.settings import IdentifyTask, TrackTask, beside
-from mgdd.rig.safety import SafetyEnvelope, knowing
+from mgdd.rig.safety import SafetyEnvelope, bounded_by
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,7 +93,7 @@ class TrackPlan:
         if delay is None and groups_of(self.model).delay_s is None:
             delay = 0  # a rig answers within its cycle, and a preset says nothing about it
         made, doubts = tuned_with_doubts(self.task.controller, self.model, sample_s=self.sample_s, delay_samples=delay)
-        return knowing(made, self.envelope), doubts
+        return bounded_by(made, self.envelope), doubts
 
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant whose last measured angle is given, for at most so many samples."""

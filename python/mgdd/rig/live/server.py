@@ -37,7 +37,7 @@ def serve_here(
     The address, with a secret word, goes to `ready`. ImportError without Bokeh, RigError for a port in use.
     """
     logging.getLogger("bokeh").setLevel(logging.ERROR)
-    for name in ("tornado.access", "asyncio"):  # a window that is closed in the midst of a message is no error
+    for name in ("tornado.access", "asyncio"):  # a window may be closed while it receives a message
         logging.getLogger(name).setLevel(logging.CRITICAL)
     routing, web = (import_extra(f"tornado.{name}", "watch", "a live page") for name in ("routing", "web"))
     path = f"/{secrets.token_urlsafe(16)}"

@@ -19,7 +19,7 @@ from mgdd.rig.can.processes import noted_signals
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.safety import SafetyEnvelope, knowing, said_of
+from mgdd.rig.safety import SafetyEnvelope, bounded_by, said_of
 
 _STEPS_DEG, _STEP_S = (20.0, 60.0, 35.0, 70.0, 15.0), 2.0
 _LONGEST_S = 3600.0
@@ -42,7 +42,7 @@ def simulate(path: str, period_s: float) -> None:
     controller, _ = tuned_with_doubts("guided", presets.load("P1").throttle, sample_s=period_s, delay_samples=1)
     envelope = SafetyEnvelope(cycle_s=period_s, **patient)
     loop = RealtimeLoop(
-        knowing(controller, envelope),
+        bounded_by(controller, envelope),
         ring,
         command=LoopMessage(can_id=0x120, signals={"duty": _DUTY, "enable": _ENABLE}),
         measurements=[LoopMessage(can_id=0x121, signals={"angle_deg": _ANGLE, **_VOLTS})],
