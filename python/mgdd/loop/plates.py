@@ -66,6 +66,11 @@ class Plate:
         return cast("PlatePlant", self.plant)
 
 
+def require_loop_delay(delay_samples: int) -> None:
+    """Refuse a delay between controller and bridge that the loops do not run."""
+    ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
+
+
 def plate_of(given: Any) -> Plate:
     """Return the plant that is meant by a throttle, a preset, a fit, its model, the file of either, or an own plant."""
     if given is None or isinstance(given, Plate):

@@ -9,7 +9,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._arguments import require_plain
 from mgdd.errors import ParameterError
-from mgdd.loop.plates import OwnPlate, PlateLike, plate_of
+from mgdd.loop.plates import OwnPlate, PlateLike, plate_of, require_loop_delay
 from mgdd.loop.reference import Reference
 from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.results.finding import Finding
@@ -138,7 +138,7 @@ def track(
             "controller", controller, "an object with step(reference_deg, measurement_deg); "
             "tuned_controller('guided', model) makes one for a throttle, a preset or a fit"
         )  # fmt: skip
-    ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
+    require_loop_delay(delay_samples)
     if not isinstance(plate.plant, Throttle):
         if sensors is not None:
             raise ParameterError.of("sensors", sensors, "left out where the plant is not a throttle: give noise_deg")

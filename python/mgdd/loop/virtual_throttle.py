@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,7 +10,10 @@ from mgdd import _core
 from mgdd._settings import remade
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
-from mgdd.presets.meant import ThrottleLike, throttle_of
+from mgdd.loop.plates import model_of, require_loop_delay
+from mgdd.presets.meant import ThrottleLike, moving_throttle_of, unknown_to_a_fit, whole_delay_of
+from mgdd.results import Fit
+from mgdd.signals.model import SampledModel
 from mgdd.throttle import SensorPair, Throttle
 from mgdd.throttle.sensors import ThrottleFault, fault_pair
 
@@ -21,11 +25,14 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
 
     Parameters
     ----------
-    throttle : Throttle, Preset, str or path-like, optional
-        Its parameters; the preset ``P1`` if left out.
+    throttle : Throttle, Preset, Fit, FirstPrincipleModel, str or path-like, optional
+        Its parameters; the preset ``P1`` if left out. A first-principle fit, its model or the file of either moves as
+        its log did; it has neither ``supply_v`` nor ``airflow_torque_nm``, and its current and supply are NaN.
     inputs : sequence of str
         Which of ``duty`` [-], ``supply_v`` [V], ``airflow_torque_nm`` [N m] and ``bridge_open`` are applied; the others
         stay at 0 and at the supply of the throttle. While ``bridge_open`` is not 0 no current flows, whatever the duty.
+    delay_samples : int, optional
+        Samples until a duty acts; those of the fit, else 0, if left out.
     sensors : SensorPair, optional
         As in `mgdd.throttle.SensorPair.sense`.
     faults : sequence of ThrottleFault
@@ -59,9 +66,10 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
 
     def __init__(
         self,
-        throttle: ThrottleLike | None = None,
+        throttle: ThrottleLike | Fit | SampledModel | None = None,
         *,
         inputs: Sequence[str] = ("duty",),
+        delay_samples: int | None = None,
         sensors: SensorPair | None = None,
         faults: Sequence[ThrottleFault] = (),
         start_deg: float | None = None,
@@ -73,15 +81,22 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         if not inputs or len(set(inputs)) < len(inputs) or not set(inputs) <= set(_INPUTS):
             raise ParameterError.of("inputs", list(inputs), f"some of {', '.join(_INPUTS)}, once each")
         ParameterError.unless(0 <= seed < 2**64, "seed", seed, "in [0, 2**64)")
-        self.throttle = Throttle() if throttle is None else throttle_of(throttle)
+        self.throttle, self._model = moving_throttle_of(model_of(Throttle() if throttle is None else throttle))
+        if self._model is not None and (torques := {"supply_v", "airflow_torque_nm"} & set(inputs)):
+            raise unknown_to_a_fit("inputs", min(torques))
+        delay = delay_samples if delay_samples is not None else whole_delay_of(self._model, sample_s) or 0
+        require_loop_delay(delay)
+        self.delay_samples = delay
+        self._waiting = (0.0,) * delay
         self.sample_s = sample_s
         self.input_names = tuple(inputs)
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._settings: dict[str, Any] = {
-            "throttle": self.throttle,
+            "throttle": self.throttle if self._model is None else self._model,
             "inputs": self.input_names,
+            "delay_samples": delay,
             "sensors": sensors or SensorPair(),
             "faults": tuple(faults),
             "start_deg": self.start_deg,
@@ -90,13 +105,15 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
             "bridge": bridge,
             "seed": seed,
         }
-        own = {name: value for name, value in self._settings.items() if name not in ("inputs", "faults")}
+        here = {"throttle", "inputs", "delay_samples", "faults"}
+        own = {name: value for name, value in self._settings.items() if name not in here}
         of_sensors = fault_pair([fault for fault in faults if fault.sensor is not None])
         of_others = [fault.to_core() for fault in faults if fault.sensor is None]
-        super().__init__(faults=of_sensors, plant_faults=of_others, **own)
+        super().__init__(throttle=self.throttle, faults=of_sensors, plant_faults=of_others, **own)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return remade, (type(self), (), self._settings, {"state": self.state, "_applied": self._applied})
+        since = {"state": self.state, "_applied": self._applied, "_waiting": self._waiting}
+        return remade, (type(self), (), self._settings, since)
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.
@@ -122,10 +139,13 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
         applied = self._applied
+        *self._waiting, duty = (applied["duty"], *self._waiting)
         reading = self.step(
-            duty=applied["duty"],
+            duty=duty,
             supply_v=applied["supply_v"],
             airflow_torque_nm=applied["airflow_torque_nm"],
             bridge_open=applied["bridge_open"] != 0.0,
         )
+        if self._model is not None:
+            reading |= {"current_a": math.nan, "supply_v": math.nan}
         return Measurement(values={name: float(value) for name, value in reading.items()})

@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,10 @@ import pytest
 from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.loop import track, track_many, tune_controller, tuned_controller
+from mgdd.loop import VirtualThrottle, track, track_many, tune_controller, tuned_controller
+from mgdd.rig import Experiment, run_experiment
+from mgdd.rig.experiment import check_experiment
+from mgdd.rig.experiment.checked import simulated_plant
 from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle
 
 FIT = FirstPrincipleModel(
@@ -62,6 +66,45 @@ def test_fit_model_and_file_are_one_plant_with_its_delay(tmp_path: Path) -> None
     tuned = tune_controller("pid", file, n_throttles=2, budget=30, seed=1)
     assert tuned.settings["delay_samples"] == 2
     assert tuned.cost <= tuned.start_cost
+
+
+def test_a_virtual_throttle_is_the_fit_sample_by_sample_with_its_delay(tmp_path: Path) -> None:
+    file = tmp_path / "fit.toml"
+    file.write_text(FIT.to_toml())
+    run = track(tuned_controller("guided", FIT), "step:20:50", throttle=FIT, noise_deg=0.0, seed=2)
+    duty, angle = run["duty"].to_numpy(), run["angle_deg"].to_numpy()
+    for given in (FIT, file):
+        plant = VirtualThrottle(given, start_deg=20.0)
+        assert plant.delay_samples == 2  # of 2.4
+        rows: list[dict[str, Any]] = []
+        for k, value in enumerate(duty[:300]):
+            if k == 140:
+                plant = pickle.loads(pickle.dumps(plant))
+            plant.apply({"duty": value})
+            rows.append(dict(plant.measure().values))
+        np.testing.assert_array_equal([row["angle_deg"] for row in rows], angle[:300])
+        assert all(math.isnan(row["current_a"]) and math.isnan(row["supply_v"]) for row in rows)
+    stated = VirtualThrottle(Throttle(), delay_samples=1, start_deg=8.0)
+    for waits in (True, False):
+        stated.apply({"duty": 0.5})
+        assert (stated.measure().values["current_a"] == 0.0) == waits
+
+
+def test_an_experiment_simulates_a_fit_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FIT.to_toml())
+    text = (
+        'kind = "experiment"\nformat = 1\nseed = 3\ntask = "track"\n[track]\nreference = "step:20:35"\n'
+        'model = "mine.toml"\n[plant]\npreset = "mine.toml"\nsample_s = 0.001\n[plant.scale]\ncoulomb_nm = 1.2\n'
+    )
+    (tmp_path / "experiment.toml").write_text(text)
+    checked = check_experiment(Experiment.load(tmp_path / "experiment.toml"))
+    plant = simulated_plant(checked.experiment, sample_s=1e-3, inputs=("duty", "bridge_open"))
+    assert isinstance(plant, VirtualThrottle)
+    assert plant.delay_samples == 2
+    whole = FIT.to_throttle(resistance_ohm=1.0, supply_v=12.0, inertia_kgm2=2e-3)
+    assert plant.throttle.coulomb_nm == pytest.approx(1.2 * whole.coulomb_nm)
+    result = run_experiment(checked.experiment, folder=tmp_path / "run")
+    assert result.figures["settling_ms"] < 100.0
 
 
 def test_a_pseudo_wiener_model_moves_as_its_free_run() -> None:
@@ -131,6 +174,9 @@ class Lost(Leaf):
         (lambda: tune_controller("pid", []), ParameterError, "at least one"),
         (lambda: simulate_throttle(FIT, 0.3, supply_v=11.0), ParameterError, "to_throttle"),
         (lambda: simulate_throttle(FIT, 0.3, bridge="open"), ParameterError, "bridge"),
+        (lambda: VirtualThrottle(FIT, inputs=("duty", "supply_v")), ParameterError, "inputs = 'supply_v'.*to_throttle"),
+        (lambda: VirtualThrottle(PseudoWiener("pw_r", {})), ParameterError, "first-principle fit"),
+        (lambda: VirtualThrottle(delay_samples=21), ParameterError, r"delay_samples = 21: must be in \[0, 20\]"),
         (lambda: track(PID, "step:40:42", throttle="P9.toml"), (DataError, FileNotFoundError), "P9"),
     ],
 )

@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.io.files import existing_file
 from mgdd.loop import Plant, VirtualEngine, VirtualTestBed, VirtualThrottle
+from mgdd.loop.plates import model_of
 from mgdd.loop.track import sensors_of
+from mgdd.presets.meant import moving_throttle_of, whole_delay_of
 from mgdd.results.describe import described
 from mgdd.rig.can.can_rig import BUS_MODES
 from mgdd.rig.can.signal_map import SignalMap, loop_messages
@@ -28,7 +30,7 @@ from mgdd.rig.experiment.settings import (
     beside,
     scaled,
 )
-from mgdd.rig.experiment.tasks import IdentifyPlan, TrackPlan, throttle_named
+from mgdd.rig.experiment.tasks import IdentifyPlan, TrackPlan
 from mgdd.rig.recorded import RecordedRun, readable_record
 from mgdd.rig.safety import SafetyEnvelope
 
@@ -257,9 +259,11 @@ def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: S
                 raise
             table = "safety" if error.value in experiment.safety.limits else experiment.task
             raise error.reworded(f"{table}.{error}") from error
+    sample_s = sample_s or SAMPLE_S
+    body, fitted = moving_throttle_of(model_of(beside(folder, plant.preset)))
     return VirtualThrottle(
-        scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
-        sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
+        scaled(body, plant.scale, "plant"), inputs=inputs, delay_samples=whole_delay_of(fitted, sample_s),
+        sensors=sensors_of(plant.noise_deg), sample_s=sample_s, seed=experiment.seed,
     )  # fmt: skip
 
 
