@@ -51,7 +51,7 @@ class StudyResult(Report):
     Examples
     --------
     >>> from mgdd_studies import run_study
-    >>> result = run_study("measured-traces", quick=True, figures=False)
+    >>> result = run_study("measured-traces")
     >>> len(result.summary["traces"])
     4
     """

@@ -80,8 +80,8 @@ def run_calibrated_guide(
 
     Examples
     --------
-    >>> from mgdd_studies.calibrated_guide import run_calibrated_guide
-    >>> rows = run_calibrated_guide(n_seeds=1, quick=True, figures=False).summary["rows"]
+    >>> from mgdd_studies import run_study
+    >>> rows = run_study("calibrated-guide", n_seeds=2, quick=True).summary["rows"]
     >>> [round(rows[at]["guide_error_end_cad"], 0) for at in (0, 1)]  # Wiebe 45, not calibrated and calibrated
     [7.0, -1.0]
     """

@@ -108,8 +108,8 @@ def run_guide_accuracy(
 
     Examples
     --------
-    >>> from mgdd_studies.guide_accuracy import run_guide_accuracy
-    >>> result = run_guide_accuracy(n_seeds=2, quick=True, figures=False)
+    >>> from mgdd_studies import run_study
+    >>> result = run_study("guide-accuracy", n_seeds=4, quick=True)
     >>> rows = {(row["form"], row["guide"]): row for row in result.summary["rows"]}
     >>> rows["feed-forward", "wall heat +30 %"]["lost"] < 0.5 * rows["feed-forward", "none"]["lost"]
     True

@@ -133,8 +133,8 @@ def run_guided_start_up(
 
     Examples
     --------
-    >>> from mgdd_studies.guided_start_up import run_guided_start_up
-    >>> result = run_guided_start_up(n_seeds=4, quick=True, figures=False)
+    >>> from mgdd_studies import run_study
+    >>> result = run_study("guided-start-up", n_seeds=6, quick=True)
     >>> rows = {row["guide"]: row for row in result.summary["rows"]}
     >>> rows["wall heat +30 %"]["cycles_to_1_cad"] < 0.5 * rows["none"]["cycles_to_1_cad"]
     True

@@ -123,8 +123,8 @@ def run_guided_transients(
 
     Examples
     --------
-    >>> from mgdd_studies.guided_transients import run_guided_transients
-    >>> result = run_guided_transients(n_seeds=1, quick=True, figures=False)
+    >>> from mgdd_studies import run_study
+    >>> result = run_study("guided-transients", n_seeds=2, quick=True)
     >>> all(row["lost_over_unguided"] < 0.7 for row in result.summary["rows"][1:])
     True
     """

@@ -36,7 +36,7 @@ def run_measured_traces(*, quick: bool = False, figures: bool = True, progress: 
     Examples
     --------
     >>> from mgdd_studies import run_study
-    >>> result = run_study("measured-traces", quick=True, figures=False)
+    >>> result = run_study("measured-traces")
     >>> [round(row["analysis"]["ca50_cad"], 1) for row in result.summary["traces"]]
     [5.0, 6.9, 9.4, 14.9]
     """

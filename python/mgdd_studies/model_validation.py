@@ -100,8 +100,8 @@ def run_model_validation(
 
     Examples
     --------
-    >>> from mgdd_studies.model_validation import run_model_validation
-    >>> rows = run_model_validation(n_seeds=2, quick=True, figures=False).summary["rows"]
+    >>> from mgdd_studies import run_study
+    >>> rows = run_study("model-validation", n_seeds=6, quick=True).summary["rows"]
     >>> own = [row for row in rows if row["law"] == "double Wiebe, linear gamma"]
     >>> [round(row["rmse_percent"], 1) for row in own if row["stage"] == "calibrated"]
     [0.1, 0.1, 0.1, 0.2]

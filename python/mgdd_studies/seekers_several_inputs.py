@@ -132,8 +132,8 @@ def run_seekers_several_inputs(
 
     Examples
     --------
-    >>> from mgdd_studies.seekers_several_inputs import run_seekers_several_inputs
-    >>> rows = run_seekers_several_inputs(n_seeds=2, quick=True, figures=False).summary["rows"]
+    >>> from mgdd_studies import run_study
+    >>> rows = run_study("seekers-several-inputs", n_seeds=4, quick=True).summary["rows"]
     >>> lost = {row["seeker"]: row["j_lost"] for row in rows if row["map"] == "coupled"}
     >>> 2.0 * lost["Gaussian process"] < lost["SPSA by tune"]
     True

@@ -123,9 +123,9 @@ def run_identification_benchmarks(
     Examples
     --------
     >>> from mgdd_studies.benchmarks import records
-    >>> from mgdd_studies.benchmarks.identification_benchmarks import run_identification_benchmarks
+    >>> from mgdd_studies import run_study
     >>> if "cascaded_tanks" in records.names():
-    ...     result = run_identification_benchmarks(quick=True, figures=False)
+    ...     result = run_study("identification-benchmarks", quick=True)
     ...     assert {"set", "train", "test"} <= set(result.summary["rows"][0])
     """
     makers: dict[Literal["emps", "cascaded_tanks", "wh2009"], Any] = {

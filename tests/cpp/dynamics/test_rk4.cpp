@@ -100,9 +100,9 @@ TEST(Passes, AreTheNarrowestThatHoldTheRest) {
   EXPECT_EQ(passes(4), (std::vector<Pass>{{0, 4}}));
   EXPECT_EQ(passes(5), (std::vector<Pass>{{0, 8}}));
   EXPECT_EQ(passes(9), (std::vector<Pass>{{0, 12}}));
-  EXPECT_EQ(passes(13), (std::vector<Pass>{{0, 12}, {12, 4}}));
-  EXPECT_EQ(passes(29), (std::vector<Pass>{{0, 12}, {12, 12}, {24, 8}}));
-  EXPECT_EQ(passes(29, 2), (std::vector<Pass>{{0, 12}, {12, 12}})) << "false stops";
+  EXPECT_EQ(passes(13), (std::vector<Pass>{{0, 16}}));
+  EXPECT_EQ(passes(37), (std::vector<Pass>{{0, 16}, {16, 16}, {32, 8}}));
+  EXPECT_EQ(passes(37, 2), (std::vector<Pass>{{0, 16}, {16, 16}})) << "false stops";
 }
 
 TEST(Seed, IsOneInItsOwnLaneOnly) {

@@ -67,7 +67,8 @@ def quick_study(name: str) -> StudyResult:
 
 def study(name: str, **options: Any) -> StudyResult:
     """Give what `mgdd_studies.run_study` gives, with figures; run it only if nobody has."""
-    call = inspect.signature(function_of(name)).bind(**(options | {"figures": True}))
+    options |= {"figures": True}
+    call = inspect.signature(function_of(name)).bind(**options)
     call.apply_defaults()
     # The result does not depend on who is told of progress; his address is another one in every process.
     told = {key: value for key, value in call.arguments.items() if value is not None and not callable(value)}
@@ -78,7 +79,7 @@ def study(name: str, **options: Any) -> StudyResult:
         fcntl.flock(lock, fcntl.LOCK_EX)  # whoever wants the same waits for the first
         if not file.exists():
             part = file.with_suffix(".part")
-            part.write_bytes(pickle.dumps(run_study(name, **(options | {"figures": True}))))
+            part.write_bytes(pickle.dumps(run_study(name, **options)))
             part.rename(file)
     result: StudyResult = pickle.loads(file.read_bytes())
     return result

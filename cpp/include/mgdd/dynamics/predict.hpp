@@ -2,6 +2,7 @@
 // the moves. noexcept, heap-free; double or float. Source of the slopes: Griewank and Walther 2008, chapter 3.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
@@ -29,7 +30,7 @@ void predict(const M& model, const PlainState& state, const std::array<S, static
       dual.step(s, input);
       const D y = dual.output(s);
       output[k] = y.value;
-      slope[k] = y.grad;
+      std::ranges::copy(y.grad, slope[k].begin());
     }
   }
 }

@@ -42,7 +42,7 @@ struct Passes {
     return true;
   }
 };
-using DefaultPasses = Passes<4, 8, 12>;
+using DefaultPasses = Passes<4, 8, 12, 16>;
 
 /// One pass: runs the seeded model and hands `visit(k, output, derivatives)` every sample from `skip` on, `derivatives`
 /// being the lanes of the pass (none on a plain scalar). False when visit said so or a number left the finite ones.

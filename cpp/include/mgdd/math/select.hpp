@@ -10,20 +10,20 @@
 namespace mgdd {
 
 template <int N, class S>
-constexpr Dual<N, S> select(bool condition, const Dual<N, S>& yes, const Dual<N, S>& no) noexcept {
+Dual<N, S> select(bool condition, const Dual<N, S>& yes, const Dual<N, S>& no) noexcept {
   return condition ? yes : no;
 }
 template <int N, class S>
-constexpr Dual<N, S> smaller(const Dual<N, S>& a, const Dual<N, S>& b) noexcept {
+Dual<N, S> smaller(const Dual<N, S>& a, const Dual<N, S>& b) noexcept {
   return b < a ? b : a;
 }
 template <int N, class S>
-constexpr Dual<N, S> larger(const Dual<N, S>& a, const Dual<N, S>& b) noexcept {
+Dual<N, S> larger(const Dual<N, S>& a, const Dual<N, S>& b) noexcept {
   return a < b ? b : a;
 }
 /// `magnitude`, negated where `from` is negative; zero counts as positive.
 template <int N, class S>
-constexpr Dual<N, S> with_sign(const Dual<N, S>& magnitude, const Dual<N, S>& from) noexcept {
+Dual<N, S> with_sign(const Dual<N, S>& magnitude, const Dual<N, S>& from) noexcept {
   return from.value < S(0) ? -magnitude : magnitude;
 }
 

@@ -265,7 +265,7 @@ class FirstPrincipleModel {
     return x - larger(smaller(x, gap), -gap);
   }
   // The speed after a step, at a stop that yields: it pushes and does not pull, linearly implicit.
-  T stopped(State& s, const T& middle, const T& push) const noexcept {
+  MGDD_INLINE T stopped(State& s, const T& middle, const T& push) const noexcept {
     const T beyond = middle - larger(smaller(middle, T(c_.open)), T(c_.closed));
     const T back = c_.stop * beyond;
     const auto touches = (back + c_.stop_damping * s.speed_deg_per_s) * beyond > T(0.0);
@@ -295,9 +295,9 @@ class FirstPrincipleModel {
     if (drops_ || preslides_) return bent(s, push, divisor);
     return dynamics::stick_or_slide(push, c_.hold, c_.slide, divisor);
   }
-  // The same with a Stribeck curve or bristles; kept out of the loop of those that have neither.
+  // The same with a Stribeck curve or bristles.
   template <class D>
-  T bent(State& s, const T& push, const D& divisor) const noexcept {
+  MGDD_INLINE T bent(State& s, const T& push, const D& divisor) const noexcept {
     const T& speed = s.speed_deg_per_s;
     const T ratio = speed * c_.over_stribeck;
     const T level = c_.slide * (T(1.0) + c_.drop * exp_of(-ratio * ratio));
