@@ -105,7 +105,7 @@ wheel-check: ready ## install the package as a user does, and try it from Python
 	compiler="$$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' build/dev/CMakeCache.txt)"; \
 	PATH="$(BARE_PATH)" CXX="$$compiler" SKBUILD_CMAKE_DEFINE="MGDD_WERROR=ON" \
 	  $(ALOUD) "$$folder/venv/bin/python" -m pip --disable-pip-version-check install .; \
-	MGDD_INSTALLED="$$folder/venv" $(ALOUD) $(PY) -m pytest -v tests/installed | tee $(LOGS)/wheel.log
+	MGDD_INSTALLED="$$folder/venv" $(ALOUD) $(PY) -m pytest -v -n $(JOBS) --dist loadfile tests/installed | tee $(LOGS)/wheel.log
 
 .PHONY: install examples
 install: $(VENV)/.stamp-run ## install the package into .venv, as `pip install .` does

@@ -251,7 +251,7 @@ def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: 
     assert "without a comparison: PW-R is not made for such a throttle (" in said(fit, "model_chosen")
 
 
-@pytest.mark.parametrize("delay", one_of(12, 6, 7, 20))
+@pytest.mark.parametrize("delay", one_of(12, 7, 20))
 def test_a_long_delay_is_found_and_its_controller_takes_it(delay: int) -> None:
     """Beyond five samples, where the first look ends: the search goes on while the longest are the best."""
     rng, time = np.random.default_rng(3), np.arange(4000) * 1e-3
@@ -270,7 +270,7 @@ def test_a_long_delay_is_found_and_its_controller_takes_it(delay: int) -> None:
 
 @pytest.mark.parametrize(
     ("delay", "tried", "end"),
-    one_of((6, [3, 4, 5], "longest"), (7, [3, 4, 5], "longest"), (12, [3, 4, 5], "longest"), (5, [3, 4, 5], "longest"),
+    one_of((6, [3, 4, 5], "longest"), (12, [3, 4, 5], "longest"), (5, [3, 4, 5], "longest"),
            (2, [3, 4, 5], "shortest")),
 )  # fmt: skip
 def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(
