@@ -32,10 +32,10 @@ def run(function: Callable[..., Any], *given: Any, seconds: float = 120.0) -> tu
 
 def alive(process: int) -> bool:
     try:
-        os.kill(process, 0)
-    except ProcessLookupError:
+        status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
+    except (FileNotFoundError, ProcessLookupError):  # it may go while it is read
         return False
-    return "State:\tZ" not in Path(f"/proc/{process}/status").read_text(encoding="ascii")
+    return "State:\tZ" not in status
 
 
 def becomes_dead(process: int) -> bool:
