@@ -75,16 +75,19 @@ class Script:
         Words behind ``mgdd``.
     kept : tuple of str
         Names whose results are wanted.
+    before : tuple of tuple of str
+        Commands that make the files of `command`.
     """
 
     lines: tuple[tuple[str, Any], ...]
     command: tuple[str, ...]
     kept: tuple[str, ...]
+    before: tuple[tuple[str, ...], ...] = ()
 
     @property
     def shell(self) -> str:
-        """The command as it is typed in the folder of the files."""
-        return shlex.join(["mgdd", *self.command])
+        """The commands as they are typed in the folder of the files, one a line."""
+        return "\n".join(shlex.join(["mgdd", *words]) for words in (*self.before, self.command))
 
     @property
     def python(self) -> str:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from mgdd.rig.live.server import serve_here
 from mgdd.workbench.jobs import prepare
 from mgdd.workbench.parts import panel
+from mgdd.workbench.pictures import bokeh
 from mgdd.workbench.session import Session
 from mgdd.workbench.views.check import Check
 from mgdd.workbench.views.cycles import Cycles
@@ -54,8 +55,12 @@ class Bench:
 
     def follow(self) -> None:
         """Let the other views follow the chosen file."""
-        for view in (self.check, self.cycles, self.timing) if hasattr(self, "views") else ():
+        if not hasattr(self, "views"):  # it is not ready yet
+            return
+        for view in (self.check, self.cycles, self.timing):
             view.show()
+        for plant in (self.search, self.map):
+            plant.engine.options = self.session.engines
 
     def close(self) -> None:
         """End all work of the window, and forget its files."""
@@ -79,7 +84,7 @@ def _template() -> Any:
 def window() -> Any:
     """Make the page of one window."""
     pn = panel()
-    pn.extension("filedropper")
+    pn.extension()
     # Panel knows where its own files are only in a page, and not in one that comes back after its session was ended.
     pn.state.curdoc.template_variables.setdefault("dist_url", _FILES)
     bench = Bench()
@@ -96,6 +101,7 @@ def serve(port: int, ready: Callable[[str], None], *, alive: Callable[[], bool] 
     """Serve the workbench on this machine alone; as `mgdd.rig.live.server.serve_here`."""
     server_of = panel().io.server.get_server
     prepare()
+    bokeh("plotting")  # before the first file is dropped
 
     def made(path: str, options: Mapping[str, Any]) -> Any:
         own = {**options, "unused_session_lifetime_milliseconds": _UNUSED_MS}

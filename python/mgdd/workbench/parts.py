@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from io import BytesIO
-from typing import Any, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
-from mgdd.errors import Error
+from mgdd.errors import DataError, Error
 from mgdd.io.extras import import_extra
 from mgdd.workbench.calls import Script
 from mgdd.workbench.jobs import Job
+
+if TYPE_CHECKING:
+    from mgdd.workbench.session import Session
 
 _TICK_MS = 60
 _STYLE = """
@@ -32,7 +36,6 @@ pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel-su
   tr { border-bottom: 1px solid var(--panel-border-color); } }
 .check b { display: inline-block; min-width: 9em; }
 """
-_DROP = ".filepond--panel-root, .filepond--panel-root > * { background: var(--panel-surface-color) !important; }"
 _BADGES = {"no fault found": "good", "open": "open", "doubt": "doubt", "fail": "fail"}
 
 
@@ -74,22 +77,6 @@ def save(name: str, content: bytes) -> Any:
     return panel().widgets.FileDownload(
         file=BytesIO(content), filename=name, label=f"Save {name}", color="success", width=190, align="end"
     )
-
-
-def dropper(dropped: Callable[[str, bytes | str], object], most_mb: int, *, multiple: bool = False) -> Any:
-    """Make the place where files are dropped; each of them goes to `dropped` and is not kept here."""
-    made = panel().widgets.FileDropper(
-        multiple=multiple, max_file_size=f"{most_mb}MB", previews=[], sizing_mode="stretch_width", stylesheets=[_DROP]
-    )
-
-    def taken(_: Any) -> None:
-        arrived = dict(made.value)
-        made.value.clear()
-        for name, content in arrived.items():
-            dropped(name, content)
-
-    made.param.watch(taken, "value")
-    return made
 
 
 def pre(lines: str) -> str:
@@ -175,6 +162,22 @@ class Form:
         return side(*self.widgets.values())
 
 
+class Sliders:
+    """Upper limits as sliders, by name with label and end; one at 0 limits nothing."""
+
+    def __init__(self, limits: Mapping[str, tuple[str, float]]) -> None:
+        slider = panel().widgets.EditableFloatSlider
+        self.widgets = {
+            name: slider(label=f"{label}; 0: none", start=0.0, end=end, step=end / 400.0, value=0.0, width=280)
+            for name, (label, end) in limits.items()
+        }
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Limits that are set, by name."""
+        return {name: float(widget.value) for name, widget in self.widgets.items() if widget.value > 0.0}
+
+
 class SameAs:
     """The command and the Python that do what the view did."""
 
@@ -189,16 +192,44 @@ class SameAs:
         self._page.object = pre(script.shell) + pre(script.python)
 
 
-class Work:
-    """One piece of work at a time, with its bar, a button that ends it, and the sentence where it fails."""
+class View:
+    """What every page has: the session, its piece of work, and the command and Python that do the same."""
 
-    def __init__(self, *, stops: bool = False) -> None:
+    title = ""
+
+    def __init__(self, session: Session, *, stops: bool = False) -> None:
+        self.session, self.same = session, SameAs()
+        self.work = Work(stops=stops, hidden=f"{session.folder}/")
+
+    def run(self, what: str, function: Callable[..., Any], script: Script, *given: Any, **how: Any) -> None:
+        """Show a script, and begin it; `how` as `Work.begin`."""
+        self.same.show(script)
+        self.work.begin(what, function, script, *given, **how)
+
+    def take(self, name: str, content: bytes) -> Path | None:
+        """Take a file that is not one of pressure; None, and a sentence, where it cannot be."""
+        try:
+            path = self.session.take(name, content).path
+        except DataError as error:
+            self.work.say(str(error), "bad")
+            return None
+        self.session.files.pop(path.name)
+        return path
+
+
+class Work:
+    """One piece of work at a time, with its bar, a button that ends it, and the sentence where it fails.
+
+    What ends by itself with what is finished `stops`; what is `hidden` is left out of sentences, as a folder is.
+    """
+
+    def __init__(self, *, stops: bool = False, hidden: str = "\0") -> None:
         widgets = panel().widgets
         self._bar = widgets.Progress(active=True, value=-1, sizing_mode="stretch_width", height=8, visible=False)
         self._said = page()
         self._button = button("Stop" if stops else "Cancel", self.leave)
         self._button.visible = False
-        self._stops, self._job, self._ticks = stops, cast("Job | None", None), cast("Any", None)
+        self._hidden, self._stops, self._job, self._ticks = hidden, stops, cast("Job | None", None), cast("Any", None)
         self.layout = column(panel().Row(self._button, self._bar, sizing_mode="stretch_width"), self._said)
 
     @property
@@ -208,7 +239,7 @@ class Work:
 
     def say(self, line: str, kind: str = "") -> None:
         """Show a sentence."""
-        self._said.object = text(line, kind) if line else ""
+        self._said.object = text(line.replace(self._hidden, ""), kind) if line else ""
 
     def begin(
         self,
@@ -242,7 +273,7 @@ class Work:
             self._leave()
             self.say(job.error, "bad" if job.error else "")
             if job.error and self._failed is not None:
-                self._failed(job.error)
+                self._failed(job.error.replace(self._hidden, ""))
             elif not job.error:
                 self.say("stopped: what is finished is shown" if job.interrupted else "")
                 self._shown(job.result)

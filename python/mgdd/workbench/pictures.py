@@ -30,11 +30,11 @@ def axis_text(variable: xr.DataArray, name: str = "") -> str:
     return f"{label.long_name or name} [{label.units}]"
 
 
-def canvas(x: str, y: str, *, log: bool = False, **options: Any) -> Any:
-    """Make an empty figure with cursor, zoom and a button that saves it."""
-    kind = "log" if log else "linear"
+def canvas(x: str, y: str, *, log: str = "", **options: Any) -> Any:
+    """Make an empty figure with cursor, zoom and a button that saves it; `log` names the logarithmic axes."""
+    kinds = {f"{axis}_axis_type": "log" if axis in log else "linear" for axis in "xy"}
     figure = bokeh("plotting").figure(
-        x_axis_label=x, y_axis_label=y, x_axis_type=kind, y_axis_type=kind, height=_HEIGHT, min_width=280,
+        x_axis_label=x, y_axis_label=y, **kinds, height=_HEIGHT, min_width=280,
         sizing_mode="stretch_width", tools="pan,box_zoom,xwheel_zoom,reset,save,crosshair", output_backend="canvas",
         **options,
     )  # fmt: skip
@@ -72,24 +72,24 @@ def line(figure: Any, x: Any, y: Any, label: str, colour: str, *, dash: str = "s
     return source
 
 
-def mark(figure: Any, along: str, at: float) -> None:
+def mark(figure: Any, along: str, at: float, colour: str = "#c62828") -> None:
     """Mark a value by a dashed line over the whole ``height`` or ``width``."""
-    figure.add_layout(bokeh("models").Span(location=at, dimension=along, line_dash="dashed", line_color="#c62828"))
+    figure.add_layout(bokeh("models").Span(location=at, dimension=along, line_dash="dashed", line_color=colour))
 
 
-def with_legend(figure: Any) -> Any:
+def with_legend(figure: Any, columns: int = 3) -> Any:
     """Put the legend above the axes, where it hides nothing."""
     if figure.legend:
         legend = figure.legend[0]
         legend.update(
-            orientation="horizontal", ncols=3, click_policy="hide", label_text_font_size="12px", padding=2, margin=0,
-            border_line_color=None, background_fill_alpha=0.0,
+            orientation="horizontal", ncols=columns, click_policy="hide", label_text_font_size="12px", padding=2,
+            margin=0, border_line_color=None, background_fill_alpha=0.0,
         )  # fmt: skip
         figure.add_layout(legend, "above")
     return figure
 
 
-def traces(datasets: Mapping[str, xr.Dataset], name: str, *, over: str = "crank_angle_cad", log: bool = False) -> Any:
+def traces(datasets: Mapping[str, xr.Dataset], name: str, *, over: str = "crank_angle_cad", log: str = "") -> Any:
     """Draw a variable of one record or several over another; of many cycles the cloud, and their mean."""
     first = next(iter(datasets.values()))
     figure = canvas(axis_text(first[over], over), axis_text(first[name], name), log=log)
@@ -105,6 +105,44 @@ def traces(datasets: Mapping[str, xr.Dataset], name: str, *, over: str = "crank_
     return with_legend(figure)
 
 
+def spectrum(datasets: Mapping[str, xr.Dataset]) -> Any:
+    """Draw the spectra of the cycles with the knock band, the frequency of ringing and the first tangential mode."""
+    figure = traces(datasets, "pressure_psd_bar2_per_khz", over="frequency_khz", log="y")
+    first = next(iter(datasets.values()))
+    for edge in first.attrs.get("knock_band_hz", ()):
+        mark(figure, "height", 1e-3 * edge, GREY)
+    for name, colour in (("tangential_mode_khz", COLOURS[1]), ("ringing_frequency_khz", COLOURS[2])):
+        if name in first and np.isfinite(first[name]):
+            label = f"{label_of(first[name]).long_name}: {float(first[name]):.2f} kHz"
+            mark(figure, "height", float(first[name]), colour)
+            figure.line([], [], color=colour, line_dash="dashed", legend_label=label)
+    return with_legend(figure, columns=1)
+
+
+def cycle_map(data: xr.Dataset, name: str) -> Any:
+    """Draw a trace of every cycle as a row of colours, where it burns; of pressure what differs from the mean."""
+    shown = data.sel(crank_angle_cad=slice(-40.0, 100.0)) if data["crank_angle_cad"].size > 1 else data
+    rows, angle = shown[name].transpose("cycle", "crank_angle_cad"), shown["crank_angle_cad"]
+    label = label_of(rows)
+    less = rows.mean("cycle") if name == "pressure_bar" else 0.0
+    values = np.asarray(rows - less, np.float32)
+    low, high = (float(each) for each in np.nanpercentile(values, (0.5, 99.5)))
+    if name == "pressure_bar":
+        high = max(high, -low)
+        low = -high
+    title = f"{label.long_name}{' less its mean' if name == 'pressure_bar' else ''} [{label.units}]"
+    cycle = np.asarray(data["cycle"])
+    figure = canvas(axis_text(angle, "crank_angle_cad"), "cycle [-]", title=title)
+    mapper = bokeh("models").LinearColorMapper(palette="Viridis256", low=low, high=max(high, low + 1e-9))
+    x, wide = float(angle[0]), float(angle[-1] - angle[0])
+    drawn = figure.image([values], x, float(cycle[0]) - 0.5, wide, float(cycle[-1] - cycle[0]) + 1.0,
+                         color_mapper=mapper)  # fmt: skip
+    tips = [("angle", "$x{0.0}"), ("cycle", "$y{0}"), ("value", "@image{0.000}")]
+    figure.add_tools(bokeh("models").HoverTool(renderers=[drawn], tooltips=tips))
+    figure.add_layout(bokeh("models").ColorBar(color_mapper=mapper, width=10), "right")
+    return figure
+
+
 def by_cycle(datasets: Mapping[str, xr.Dataset], name: str) -> Any:
     """Draw a figure from cycle to cycle."""
     first = next(iter(datasets.values()))
@@ -114,10 +152,11 @@ def by_cycle(datasets: Mapping[str, xr.Dataset], name: str) -> Any:
     return with_legend(figure)
 
 
-def cells(table: xr.DataArray) -> Any:
+def cells(table: xr.DataArray, title: str = "") -> Any:
     """Draw a map of one axis as a line, of two as coloured cells with their values."""
     axes = [str(dim) for dim in table.dims]
     models, own = bokeh("models"), axis_text(table, str(table.name))
+    own = f"{title}: {own}" if title else own
     if len(axes) == 1:
         figure = canvas(axis_text(table[axes[0]], axes[0]), own)
         line(figure, table[axes[0]], table, "", COLOURS[0])

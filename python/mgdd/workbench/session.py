@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from mgdd.engine import PressureCheck
 
-MOST_FILE_MB, MOST_FILES_MB, MOST_FILES = 64, 512, 200
+MOST_FILE_MB, MOST_FILES_MB, MOST_FILES, MOST_PRESET_MB = 64, 512, 200, 1
 _LONGEST_NAME = 150
 MEAN = Call("mean", ("cycle",), {"keep_attrs": True}, of=Named("trace"))
 PEGGING = ("pegging", "pegging_exponent", "inlet_pressure_kpa")
@@ -76,25 +76,25 @@ class Session:
         self.close = finalize(self, shutil.rmtree, self.folder, ignore_errors=True)  # at the end of Python, too
         self.files: dict[str, Loaded] = {}
         self.preset = ""  # none stated
+        self.own_engines: dict[str, Path] = {}  # presets that were dropped, by the name of their file
         self.cylinder: dict[str, Any] = {}  # fields that differ from the preset
         self.point: dict[str, float] = {}  # fields that were given
 
-    def take(self, name: str, content: bytes | str) -> Loaded:
+    def take(self, name: str, content: bytes) -> Loaded:
         """Write a dropped file; DataError for one too many, too large, or without a name."""
-        raw = content.encode() if isinstance(content, str) else content
         own = "".join(c if c.isprintable() else "_" for c in Path(name.replace("\\", "/")).name).strip()
         if not own.strip(".") or len(own.encode()) > _LONGEST_NAME:
             raise DataError(f"{own[:40]!r} cannot be the name of a file here: rename it")
         held = sum(one.path.stat().st_size for key, one in self.files.items() if key != own)
-        if len(raw) > MOST_FILE_MB << 20 or held + len(raw) > MOST_FILES_MB << 20:
+        if len(content) > MOST_FILE_MB << 20 or held + len(content) > MOST_FILES_MB << 20:
             raise DataError(
-                f"{own}: {len(raw) / 1e6:.0f} MB; a file may have {MOST_FILE_MB} MB here, all {MOST_FILES_MB}: use "
+                f"{own}: {len(content) / 1e6:.0f} MB; a file may have {MOST_FILE_MB} MB here, all {MOST_FILES_MB}: use "
                 "mgdd engine analyze FILE --chunk-cycles 100, or cut it"
             )
         if own not in self.files and len(self.files) >= MOST_FILES:
             raise DataError(f"{own}: {MOST_FILES} files are open: use mgdd engine check FOLDER/*")
         path = self.folder / own
-        path.write_bytes(raw)
+        path.write_bytes(content)
         self.files[own] = Loaded(path)
         return self.files[own]
 
@@ -102,21 +102,36 @@ class Session:
         """Forget a file."""
         self.files.pop(name).path.unlink(missing_ok=True)
 
-    def engine_lines(self) -> tuple[tuple[str, Any], ...]:
-        """Give the lines that make cylinder and point."""
+    @property
+    def engines(self) -> list[str]:
+        """Name the engines that can be stated."""
+        return [*presets.available("engine"), *self.own_engines]
+
+    @property
+    def preset_file(self) -> str | Path:
+        """The engine that was stated, by name or as its file."""
+        return self.own_engines.get(self.preset, self.preset)
+
+    def preset_of(self, engine: str) -> str | File:
+        """Write what `presets.load` takes for an engine."""
+        return File(self.own_engines[engine]) if engine in self.own_engines else engine
+
+    def engine_lines(self, one: Loaded | None = None) -> tuple[tuple[str, Any], ...]:
+        """Give the lines that make cylinder and point, with the speed of a file where it has its own."""
+        own = {"speed_rpm": one.options["speed_rpm"]} if one is not None and "speed_rpm" in one.options else {}
 
         def of(part: str, changes: Mapping[str, Any]) -> Call:
             if not changes:
                 return Call(part, of=Named("preset"), reads=True)
             return Call(f"{part}.replace", of=Named("preset"), options=changes)
 
-        load = Call("presets.load", (self.preset,))
-        return ("preset", load), ("cylinder", of("cylinder", self.cylinder)), ("point", of("point", self.point))
+        load = Call("presets.load", (self.preset_of(self.preset),))
+        return ("preset", load), ("cylinder", of("cylinder", self.cylinder)), ("point", of("point", self.point | own))
 
     def engine_words(self) -> tuple[str, ...]:
         """Give the options of the command that state the same."""
         fields = (f"--set={name}={value!r}" for name, value in self.cylinder.items())
-        return (f"--preset={self.preset}", *fields, *words(self.point))
+        return (f"--preset={file_word(self.preset)}", *fields, *words(self.point))
 
     def trace_line(self, one: Loaded) -> Call:
         """Read a file."""
@@ -132,7 +147,7 @@ class Session:
         options = {"point": Named("point"), **one.pegging, "fuel_mg": self.point.get("fuel_mg")}
         check = ("check", Call("engine.check_pressure", (Named("trace"), Named("cylinder")), options))
         command = ("engine", "check", file_word(name), *self.engine_words(), *words(one.options))
-        return Script((*self.engine_lines(), read, check), command, ("trace", "check"))
+        return Script((*self.engine_lines(one), read, check), command, ("trace", "check"))
 
     def analyze_script(self, one: Loaded) -> Script:
         """Read and analyse a file, every cycle with its traces."""
@@ -140,7 +155,7 @@ class Session:
         if "inlet_pressure_kpa" not in one.pegging:
             options["inlet_pressure_kpa"] = self.point.get("intake_pressure_kpa")
         lines = (
-            *self.engine_lines(),
+            *self.engine_lines(one),
             ("trace", self.trace_line(one)),
             ("figures", Call("engine.analyze", (Named("trace"), Named("cylinder")), options)),
         )
@@ -150,7 +165,7 @@ class Session:
     def tdc_script(self, one: Loaded) -> Script:
         """Estimate top dead centre by calibrations over a scan of the angle."""
         several = one.trace is not None and "cycle" in one.trace.dims
-        lines = [*self.engine_lines(), ("trace", self.trace_line(one))]
+        lines = [*self.engine_lines(one), ("trace", self.trace_line(one))]
         if one.pegging:
             options = {"point": Named("point"), **one.pegging, "quiet": True}
             lines.append(("figures", Call("engine.analyze", (Named("trace"), Named("cylinder")), options)))
@@ -179,8 +194,3 @@ def words(options: Mapping[str, Any]) -> tuple[str, ...]:
 def file_word(name: str) -> str:
     """Write a file so that no command takes it for an option."""
     return f"./{name}" if name.startswith("-") else name
-
-
-def engines() -> list[str]:
-    """Name the engines that can be stated."""
-    return list(presets.available("engine"))

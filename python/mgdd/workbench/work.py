@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import pickle
 import shutil
@@ -11,8 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from mgdd import loop, maps, plot, report
-from mgdd.errors import DataError, Interrupted
+from mgdd import loop, maps, plot, report, rig
+from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.io.plain_csv import write_traces
 from mgdd.plot.style import drawn
 from mgdd.report.records import record_section
@@ -120,11 +121,59 @@ def sought(watch: Watch, script: Script, pause_s: float, state: Any, cycles: int
         if not isinstance(stop.partial, Result):
             raise
         found = stop.partial
+    state = pickle.dumps((benches[-1].plant, found.seeker))
+    return _search(found, found.dataset, [str(finding) for finding in found.findings], state)
+
+
+def _search(found: Any, data: xr.Dataset, findings: Sequence[str], state: bytes | None = None) -> dict[str, Any]:
+    """Give what is shown of a search."""
+    result = found.to_dict()
     return {
-        "result": found.to_dict(), "dataset": found.dataset, "text": found.summary(),
-        "findings": [str(finding) for finding in found.findings],
-        "state": pickle.dumps((benches[-1].plant, found.seeker)),
+        "result": result, "text": found.summary(), "findings": findings, "state": state,
+        "interrupted": result["interrupted"], "cycles": data.sizes["cycle"],
+        "estimates": {str(name): data["estimate"].sel(input=name).to_numpy() for name in data["input"].to_numpy()},
     }  # fmt: skip
+
+
+def experimented(watch: Watch, script: Script) -> dict[str, Any]:
+    """Run the experiment of a file where it is a search; it drives a bench only where a person armed it."""
+
+    def seeks(experiment: rig.Experiment) -> rig.Experiment:
+        if experiment.task != "seek":
+            raise ParameterError(f"task = {experiment.task!r}: must be 'seek' here: use mgdd rig run for another task")
+        own: Any = experiment.settings
+        uppers = {name: own.limits.get(name) for name in experiment.limit_names}
+        numbers = {name: upper if isinstance(upper, float) else None for name, upper in uppers.items()}
+        watch({"inputs": [*own.inputs], "limits": numbers, "cycles": own.cycles or 0})
+        return experiment
+
+    def cycle(one: Any) -> None:
+        measured = one.measured
+        watch((dict(one.asked) | dict(measured.applied), measured.performance, dict(measured.limits)))
+
+    found = script.run(cycle, wraps={"experiment": seeks})["found"]
+    return _search(found, found.dataset, [*found.figures["findings"], *found.events])
+
+
+def recorded(watch: Watch, script: Script) -> dict[str, Any]:
+    """Replay what a rig has recorded of a search: its readings, and the estimate."""
+    found = script.run()["found"]
+    tables = found.samples
+    if "rig" not in tables or "value.j" not in tables["rig"]:
+        raise DataError(f"tables = {', '.join(tables) or 'none'}: must hold the cycles of a search: use mgdd rig watch")
+    data = tables["rig"]
+    names = {part: [str(name).partition(".")[2] for name in data if str(name).startswith(f"{part}.")]
+             for part in ("input", "limit")}  # fmt: skip
+    columns = {part: {name: data[f"{part}.{name}"].to_numpy() for name in own} for part, own in names.items()}
+    watch({"inputs": names["input"], "limits": dict.fromkeys(names["limit"]), "cycles": data.sizes["time_s"]})
+    for k, j in enumerate(data["value.j"].to_numpy().tolist()):
+        own = ({name: float(column[k]) for name, column in columns[part].items()} for part in ("input", "limit"))
+        inputs, limits = own
+        watch((inputs, j, limits))
+    seen = tables.get("seeker", {})
+    estimates = {name: seen[f"estimate.{name}"].to_numpy() for name in names["input"] if f"estimate.{name}" in seen}
+    return {"result": {}, "text": found.summary(), "findings": [], "state": None, "interrupted": False,
+            "cycles": data.sizes["time_s"], "estimates": estimates}  # fmt: skip
 
 
 def mapped(watch: Watch, script: Script, endings: Sequence[str]) -> dict[str, Any]:
@@ -141,17 +190,27 @@ def mapped(watch: Watch, script: Script, endings: Sequence[str]) -> dict[str, An
         if not isinstance(stop.partial, Result):
             raise
         found = stop.partial
+    return {"result": found.to_dict(), "cells": found.cells, "files": _map_files(found.map, endings),
+            "text": found.summary(), "findings": [str(finding) for finding in found.findings]}  # fmt: skip
+
+
+def made_maps(_: Watch, script: Script, endings: Sequence[str]) -> dict[str, Any]:
+    """Run a script; of each map among its results come the cells and the forms of files."""
+    return {
+        name: {"cells": each.to_dataset(), "files": _map_files(each, endings)} if hasattr(each, "cells") else each
+        for name, each in script.run().items()
+    }
+
+
+def _map_files(table: maps.CalibrationMap, endings: Sequence[str]) -> dict[str, bytes]:
     files = {}
     with TemporaryDirectory() as folder:
         for ending in endings:
             file = Path(folder) / f"map{ending}"
-            try:
-                maps.write_map(found.map, file)
-            except DataError:  # a cell without a value does not go into every form
-                continue
-            files[ending] = file.read_bytes()
-    return {"result": found.to_dict(), "cells": found.cells, "files": files, "text": found.summary(),
-            "findings": [str(finding) for finding in found.findings]}  # fmt: skip
+            with contextlib.suppress(DataError):  # a cell without a value does not go into every form
+                maps.write_map(table, file)
+                files[ending] = file.read_bytes()
+    return files
 
 
 def identified(_: Watch, script: Script) -> dict[str, Any]:

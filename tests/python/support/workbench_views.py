@@ -60,11 +60,13 @@ def said(work: Any) -> str:
 
 
 def run_command(shell: str, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
-    """Run a command as it is shown, with --json; the working folder holds its files."""
-    words = shlex.split(shell)
-    assert words[0] == "mgdd"
+    """Run commands as they are shown, the last with --json; the working folder holds their files."""
+    *before, last = (shlex.split(line) for line in shell.splitlines())
+    for words in before:
+        assert main([*words[1:], "--quiet"]) in (0, 1), capsys.readouterr().err
+    assert last[0] == "mgdd"
     capsys.readouterr()
-    code = main([*words[1:], "--json", "--quiet"])
+    code = main([*last[1:], "--json", "--quiet"])
     out = capsys.readouterr()
     assert code in (0, 1), out.err
     return json.loads(out.out)

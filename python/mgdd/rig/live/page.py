@@ -27,10 +27,12 @@ _BROKEN_S = 3
 _TEMPLATE = """{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 8px; font-family: sans-serif; }
+body:has(#dark) { background: #20262b; color: #e0e0e0; }
 #lost { display: none; position: fixed; inset: 0 0 auto 0; padding: 10px; z-index: 99; background: #c62828;
 color: white; font: bold 16px sans-serif; }</style>
 {% endblock %}
-{% block contents %}<div id="lost">No news from the server: this page stands still, and its stop button does nothing.
+{% block contents %}{% if page_class %}<div id="{{ page_class }}"></div>{% endif %}
+<div id="lost">No news from the server: this page stands still, and its stop button does nothing.
 Use Ctrl-C where the rig runs, or the emergency stop; then load the page again.</div>{{ super() }}
 <script>window.mgdd_updated = Date.now() + 20000; setInterval(() => {
 document.getElementById("lost").style.display = Date.now() - window.mgdd_updated > BROKEN ? "block" : "none" }, 500)
@@ -76,6 +78,9 @@ class _View:
         )
         document.add_root(layouts.column(top, self._status, self._figures, self._timing, sizing_mode="stretch_width"))
         document.title = "mgdd rig watch"
+        if _asked_theme(document) == "dark":
+            document.theme = "dark_minimal"
+            document.template_variables["page_class"] = "dark"
         document.template = _TEMPLATE
         self._lines: list[tuple[Line, Any]] = []
         self._bars: dict[str, Any] = {}
@@ -188,6 +193,13 @@ class _View:
         made.toolbar.logo = None
         made.toolbar.autohide = True
         return made
+
+
+def _asked_theme(document: Any) -> str:
+    """Give the theme of the address, as ``?theme=dark``."""
+    request = getattr(document.session_context, "request", None)
+    asked: list[bytes] = request.arguments.get("theme", [b""]) if request is not None else [b""]
+    return asked[0].decode(errors="replace")
 
 
 def _with_legend(figure: Any, columns: int) -> None:

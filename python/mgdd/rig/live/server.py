@@ -18,7 +18,7 @@ _OURS = frozenset({"127.0.0.1", "localhost"})
 _SOCKETS, _FRAMES = ("".join(f" {kind}://{host}:*" for host in sorted(_OURS)) for kind in ("ws", "http"))
 # A browser loads nothing from elsewhere for a page, whatever stands in it, and tells nobody its address.
 _HEADERS = {
-    "Content-Security-Policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self'"
+    "Content-Security-Policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' blob:"
     f"{_SOCKETS}; frame-src{_FRAMES}",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.results.labels import label_of
 from mgdd.workbench import work
-from mgdd.workbench.parts import SameAs, Work, button, column, page, panel, save, side, text
-from mgdd.workbench.pictures import by_cycle, side_by_side, traces
+from mgdd.workbench.parts import View, button, column, page, panel, save, side, text
+from mgdd.workbench.pictures import by_cycle, cycle_map, side_by_side, spectrum, traces
 from mgdd.workbench.views.files import Files
 
 if TYPE_CHECKING:
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from mgdd.workbench.session import Loaded
 
 _FIRST = ("imep_net_bar", "imep_gross_bar", "imep_closed_bar", "p_max_bar", "ca50_cad", "mapo_bar")
-_HEAT = "heat_release_net_j_per_cad"
+_HEAT, _SPECTRUM = "heat_release_net_j_per_cad", "pressure_psd_bar2_per_khz"
 _MOST_OVERLAID = 6  # colours that can be told apart
 
 
-class Cycles:
+class Cycles(View):
     """The third page."""
 
     title = "Cycles"
 
     def __init__(self, files: Files) -> None:
-        widgets = panel().widgets
-        self.files, self.work, self.same = files, Work(), SameAs()
+        super().__init__(files.session)
+        widgets, self.files = panel().widgets, files
         self._found: dict[str, tuple[str, xr.Dataset]] = {}  # by file: the command that made it, and the figures
         self.others = widgets.MultiChoice(label="drawn over it", options=[], width=300)
         self.others.param.watch(lambda _: self.analyze(), "value")
@@ -58,21 +58,21 @@ class Cycles:
 
     def show(self) -> None:
         """Follow the chosen file."""
-        self.others.options = [name for name in self.files.session.files if name != self.files.which.value]
+        self.others.options = [name for name in self.session.files if name != self.files.which.value]
         if self.ready and self.files.file is not None:
-            self.same.show(self.files.session.analyze_script(self.files.file))
+            self.same.show(self.session.analyze_script(self.files.file))
             if self.files.which.value in self._found:
                 self.draw()
 
     def analyze(self) -> None:
         """Analyse the chosen files that were not, as they are read now."""
         names = [self.files.which.value, *self.others.value[: _MOST_OVERLAID - 1]]
-        files = self.files.session.files
+        files = self.session.files
         for name in names:
             one = files.get(name or "")
             if one is None or one.check is None:
                 continue
-            script = self.files.session.analyze_script(one)
+            script = self.session.analyze_script(one)
             if self._found.get(name, ("",))[0] != script.shell:
                 self._one(one, script)
                 return
@@ -99,9 +99,13 @@ class Cycles:
         if self.figure.value not in names and names:
             self.figure.value = names[0]
         drawn = [traces(shown, name) for name in ("pressure_bar", _HEAT) if all(name in one for one in shown.values())]
-        drawn.append(traces(shown, "pressure_bar", over="volume_l", log=True))
+        drawn.append(traces(shown, "pressure_bar", over="volume_l", log="xy"))
         if self.figure.value and all(self.figure.value in one for one in shown.values()):
             drawn.append(by_cycle(shown, self.figure.value))
+        if all(_SPECTRUM in one for one in shown.values()):
+            drawn.append(spectrum(shown))
+        if "cycle" in first.dims:
+            drawn += [cycle_map(first, name) for name in ("pressure_bar", _HEAT) if name in first]
         self._pictures.objects = [side_by_side(*drawn)]
         self._said.object = ""
 
@@ -117,6 +121,5 @@ class Cycles:
         def done(content: bytes) -> None:
             self.saved.objects = [save(name, content)]
 
-        session = self.files.session
-        scripts = session.check_script(one), session.analyze_script(one)
-        self.work.begin(f"making {name}", work.exported, what, *scripts, session.preset, done=done)
+        scripts = self.session.check_script(one), self.session.analyze_script(one)
+        self.work.begin(f"making {name}", work.exported, what, *scripts, self.session.preset, done=done)

@@ -10,18 +10,17 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.errors import DataError
+from mgdd.errors import DataError, Error
 from mgdd.workbench import work
+from mgdd.workbench.drop import dropper
 from mgdd.workbench.jobs import READ_S
 from mgdd.workbench.parts import (
     Form,
-    SameAs,
-    Work,
+    View,
     badge,
     button,
     card,
     column,
-    dropper,
     number,
     page,
     panel,
@@ -30,7 +29,7 @@ from mgdd.workbench.parts import (
     text,
 )
 from mgdd.workbench.pictures import side_by_side, traces
-from mgdd.workbench.session import MOST_FILE_MB, Loaded, Session, engines
+from mgdd.workbench.session import MOST_FILE_MB, MOST_PRESET_MB, Loaded, Session
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,6 +45,7 @@ _READING = {
     "firing_tdc_deg": ("firing TDC stands at [deg]", "0: angles are °CA aTDC"),
     "tdc_offset_cad": ("angles too large by [°CA]", "0"),
     "angle_step_deg": ("angle step, without a column [deg]", "of the file"),
+    "speed_rpm": ("speed of this file [rpm]", "of the operating point"),
     "gain_bar_per_v": ("gain of a pressure in volts [bar/V]", "of the file"),
 }
 _READING_CHOICES = {
@@ -64,18 +64,17 @@ def figure_of(one: Loaded, name: str, form: str = "mean_{}") -> float | None:
     return None
 
 
-class Files:
+class Files(View):
     """The first page."""
 
     title = "Files"
 
     def __init__(self, session: Session, changed: Callable[[], None]) -> None:
-        widgets = panel().widgets
-        self.session, self._changed = session, changed
-        self.work, self.same = Work(), SameAs()
+        super().__init__(session)
+        widgets, self._changed = panel().widgets, changed
         self._waiting: list[Loaded] = []
-        self.drop = dropper(self.add, MOST_FILE_MB, multiple=True)
-        self.engine = widgets.Select(label="engine", options=[_NOT_STATED, *engines()], width=200)
+        self.drop = dropper(self.add, MOST_FILE_MB, several=True)
+        self.engine = widgets.Select(label="engine", options=[_NOT_STATED, *session.engines], width=200)
         self.engine.param.watch(lambda event: self.state(event.new), "value")
         self.cylinder = Form({name: _labelled(Cylinder.fields()[name], name) for name in _GEOMETRY})
         self.point = Form({name: _labelled(info, name) for name, info in OperatingPoint.fields().items()})
@@ -90,6 +89,7 @@ class Files:
             self.drop, side(self.engine, self.which, button("Remove the file", self.forget)),
             self._guesses, self.work.layout, self._table, self._picture, self.same.layout,
             card("Geometry, where it is not that of the named engine", self.cylinder.layout()),
+            card("An engine of your own, from a file (TOML)", dropper(self.add_engine, MOST_PRESET_MB)),
             card("Operating point", self.point.layout(), collapsed=False),
             card("How the files are to be read", self.reading.layout()),
             side(button("Read again with these", self.apply, first=True)),
@@ -101,7 +101,7 @@ class Files:
         """The chosen file."""
         return self.session.files.get(self.which.value or "")
 
-    def add(self, name: str, content: bytes | str) -> None:
+    def add(self, name: str, content: bytes) -> None:
         """Take one file."""
         try:
             one = self.session.take(name, content)
@@ -110,6 +110,23 @@ class Files:
             return
         one.options = dict(self.reading.values)
         self.read(one)
+
+    def add_engine(self, name: str, content: bytes) -> None:
+        """Take the preset of an engine, and state it."""
+        path = self.take(name, content)
+        if path is None:
+            return
+        try:
+            presets.load(path, kind="engine")
+        except (Error, OSError) as error:
+            self.work.say(str(error), "bad")
+            return
+        self.work.say("")
+        self.session.own_engines[path.name] = path
+        self.engine.options = [_NOT_STATED, *self.session.engines]
+        if self.engine.value == path.name:  # the same once more
+            self.apply()
+        self.engine.value = path.name
 
     def state(self, name: str) -> None:
         """State the engine, and check every file anew."""
@@ -154,7 +171,7 @@ class Files:
 
         def failed(why: str) -> None:
             one.trace = one.check = None
-            one.error = why.replace(f"{self.session.folder}/", "")
+            one.error = why
             self.work.say("")
             self._arrived(one)
             self._next()
@@ -200,7 +217,7 @@ class Files:
         """Mark what nobody stated."""
         if not self.session.preset:
             return text("No engine is stated: files are read and drawn, and nothing is judged.", "bad")
-        preset = presets.load(self.session.preset)
+        preset = presets.load(self.session.preset_file)
         shown = {name: getattr(preset.cylinder, name) for name in _GEOMETRY}
         self.cylinder.hint({name: f"{value:g}" for name, value in shown.items()})
         own = {name: getattr(preset.point, name) for name in OperatingPoint.fields()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from html import escape
 from typing import Any
 
 from mgdd.errors import Error
@@ -39,7 +40,10 @@ class Live:
         except (Error, ImportError) as error:
             self._shown.object = text(str(error), "bad")
             return
-        self._shown.object = self._page._repr_html_()
+        theme = "dark" if panel().config.theme == "dark" else "light"
+        self._shown.object = (
+            f"<iframe src='{escape(self._page.url)}?theme={theme}' width='100%' height='900' style='border:0'></iframe>"
+        )
 
     def close(self) -> None:
         """End the server of the page."""

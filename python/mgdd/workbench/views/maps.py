@@ -1,4 +1,4 @@
-"""Map: seek a map on a virtual engine, visit by visit; compare it, and save it for the tools of calibration."""
+"""Map: seek a map on a virtual engine, visit by visit; beside it the sweep; smooth, compare and save them."""
 
 from __future__ import annotations
 
@@ -6,28 +6,12 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from mgdd.errors import DataError
 from mgdd.results.labels import label_of
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, File, Named, Script
+from mgdd.workbench.drop import dropper
 from mgdd.workbench.jobs import READ_S
-from mgdd.workbench.parts import (
-    Form,
-    SameAs,
-    Work,
-    button,
-    card,
-    column,
-    dropper,
-    number,
-    page,
-    panel,
-    pre,
-    save,
-    side,
-    table,
-    text,
-)
+from mgdd.workbench.parts import Form, View, button, card, column, number, page, panel, pre, save, side, table, text
 from mgdd.workbench.pictures import COLOURS, canvas, cells, line, side_by_side
 from mgdd.workbench.session import Session, file_word
 from mgdd.workbench.views.search import bench_lines, engine_form
@@ -39,16 +23,19 @@ AXES = {"speed_rpm": (1000.0, 2500.0, 4), "fuel_mg": (10.0, 25.0, 4), "intake_pr
 ENDINGS = (".dcm", ".cdfx", ".csv", ".nc")
 _COLUMNS = ("soc_cad", "regret", "sd", "objective")
 _LATEST = 8  # visits that are listed
+_STEP_CAD = 0.5  # of the sweep
+_OBJECTIVE = "efficiency_gross"
+_COMPARED = ("largest_difference", "rms_difference")
 
 
-class Map:
+class Map(View):
     """The sixth page."""
 
     title = "Map"
 
     def __init__(self, session: Session) -> None:
+        super().__init__(session, stops=True)
         widgets = panel().widgets
-        self.session, self.work, self.same = session, Work(stops=True), SameAs()
         self.engine = engine_form(session)
         self.axes = widgets.MultiChoice(label="axes, one or two", options=[*AXES], value=["speed_rpm", "fuel_mg"],
                                         max_items=2, width=300)  # fmt: skip
@@ -67,13 +54,17 @@ class Map:
         self.seed = widgets.IntInput(label="seed", value=0, start=0, width=90)
         self.column = widgets.Select(label="shown", options=[*_COLUMNS], width=320)
         self.column.param.watch(lambda _: self.draw(), "value")
+        self.weight = widgets.FloatInput(label="weight of smoothness [-]", value=1.0, start=0.0, width=180)
+        self.loss = widgets.FloatInput(label="sweep: efficiency may lose [-]", value=0.002, start=1e-5, width=210)
+        self.tolerance = widgets.FloatInput(label="sought map may move by [°CA]", value=1.0, start=0.0, width=210)
         self.other = dropper(self.compare, 8)
         self.found: dict[str, Any] = {}
+        self.made: dict[str, Any] = {}  # maps of the sweep, and the smoothed one
         self.visited: list[dict[str, Any]] = []
-        self._said, self._list, self._compared = page(), page(), page()
+        self._said, self._list, self._compared, self._beside_said = page(), page(), page(), page()
         self._ends, self.saved = side(), side()
         self.axes.param.watch(lambda _: self._show_ends(), "value")
-        self._pictures = side_by_side(None, None)
+        self._pictures, self._beside = side_by_side(None, None), column()
         self._map, self._regret = (column[0] for column in self._pictures)
         self._source: Any = None
         self.layout = column(
@@ -81,7 +72,10 @@ class Map:
             side(self.engine, self.axes, *self.timing, *self.limits.widgets.values(), self.visits, self.seed,
                  self.guided, self.wall_heat),
             self._ends, side(button("Seek the map", self.begin, first=True), self.column), self.work.layout,
-            self._pictures, self._list, self._said, self.saved,
+            self._pictures, self._list, self._said,
+            side(self.weight, self.tolerance, button("Smooth it", self.smooth), self.loss,
+                 button("Sweep, optimise, smooth", self.sweep)),
+            self._beside_said, self._beside, self.saved,
             card("Compare with a map from a file (DCM, CDFX, CSV, netCDF)", self.other, self._compared),
             self.same.layout,
         )  # fmt: skip
@@ -90,39 +84,72 @@ class Map:
     def _show_ends(self) -> None:
         self._ends.objects = [field for name in self.axes.value for field in self.ends[name]]
 
-    def script(self) -> Script:
-        """Write the work."""
-        limits, seed = self.limits.values, int(self.seed.value)
+    @property
+    def _spans(self) -> dict[str, list[Any]]:
+        return {name: [field.value for field in self.ends[name]] for name in self.axes.value}
+
+    def _bench(self) -> tuple[list[tuple[str, Any]], list[str], dict[str, Any]]:
+        """Give the lines of the engine, the words of its command, and the axes."""
+        spans = self._spans
         inputs = {"soc_cad": tuple(field.value for field in self.timing)}
-        lines, command = bench_lines(self.session, self.engine.value, inputs, limits, seed)
-        spans = {name: [field.value for field in self.ends[name]] for name in self.axes.value}
-        axes = {name: np.linspace(*span).tolist() for name, span in spans.items()}
+        lines, command = bench_lines(self.session, self.engine.value, inputs, self.limits.values, int(self.seed.value))
+        own = tuple(f"--{name.replace('_', '-')}=" for name in spans)  # an axis is no fixed value
+        return lines, [word for word in command if not word.startswith(own)], _grid(spans)
+
+    def script(self) -> Script:
+        """Write the search."""
+        lines, command, axes = self._bench()
         guide = None
         if self.guided.value:
             lines.append(("guide", Call("cylinder.replace", of=Named("preset"),
                                         options={"wall_heat_scale": self.wall_heat.value})))  # fmt: skip
             guide = Named("guide")
             command += ["--guide=model", f"--guide-set=wall_heat_scale={self.wall_heat.value!r}"]
-        options = {"limits": limits, "guide": guide, "visits": int(self.visits.value), "seed": seed}
-        call = Call("loop.seek_map", (Named("bench"), inputs, axes), options, watched="on_visit")
-        lines.append(("found", call))
-        command = [word for word in command if not word.startswith(tuple(f"--{n.replace('_', '-')}=" for n in axes))]
-        command += [f"--over={name}={low!r}:{high!r}:{n}" for name, (low, high, n) in spans.items()]
+        options = {"limits": self.limits.values, "guide": guide, "visits": int(self.visits.value),
+                   "seed": int(self.seed.value)}  # fmt: skip
+        inputs = {"soc_cad": tuple(field.value for field in self.timing)}
+        lines.append(("found", Call("loop.seek_map", (Named("bench"), inputs, axes), options, watched="on_visit")))
+        command += _over(self._spans)
         return Script(tuple(lines), ("map", "seek", *command, f"--visits={self.visits.value}"), ("found",))
+
+    def sweep_script(self) -> Script:
+        """Write the conventional way: a sweep over all cells and timings, the best of each cell, smoothed."""
+        lines, command, axes = self._bench()
+        low, high = (field.value for field in self.timing)
+        timings = {"soc_cad": [low, high, round((high - low) / _STEP_CAD) + 1]}
+        task = {"limits": self.limits.values or None, "max_loss": self.loss.value}
+        cylinder = Call("cylinder", of=Named("preset"), reads=True)
+        lines = [
+            *(each for each in lines if each[0] in ("preset", "point")),
+            ("table", Call("sweep.sweep", (cylinder, Named("point"), {**axes, **_grid(timings)}))),
+            ("best", Call("maps.optimize_map", (Named("table"), _OBJECTIVE), task)),
+            ("swept", Call("maps.smooth_map", (Named("best"),), {"weight": self.weight.value})),
+            ("achieved", Call("maps.apply_map", (Named("swept"), Named("table")))),
+        ]
+        engine = [word for word in command if not word.startswith(("--input", "--limit", "--seed"))]
+        limits = [word for word in command if word.startswith("--limit")]
+        sweep = ("engine", "sweep", *engine, *_over({**self._spans, **timings}), "-o", "table.nc")
+        best = ("map", "optimize", "table.nc", f"--maximize={_OBJECTIVE}", *limits, f"--max-loss={self.loss.value!r}",
+                "-o", "best.nc")  # fmt: skip
+        smooth = ("map", "smooth", "best.nc", f"--weight={self.weight.value!r}", "-o", "swept.nc")
+        show = ("map", "show", "swept.nc", "--sweep", "table.nc")
+        return Script(tuple(lines), show, ("swept", "achieved"), (sweep, best, smooth))
 
     def begin(self) -> None:
         """Seek the map."""
-        if not self.axes.value:
-            self.work.say("choose one axis or two", "bad")
+        if not self._has_axes():
             return
-        script = self.script()
-        self.same.show(script)
-        self.visited, self.found = [], {}
+        self.visited, self.found, self.made = [], {}, {}
         figure = canvas("visit [-]", "expected regret [% efficiency]")
         self._source = line(figure, [], [], "", COLOURS[0], points=True)
         self._regret.object = figure
-        self.saved.objects = []
-        self.work.begin("seeking the map", work.mapped, script, ENDINGS, told=self.told, done=self.done)
+        self._show_made()
+        self.run("seeking the map", work.mapped, self.script(), ENDINGS, told=self.told, done=self.done)
+
+    def _has_axes(self) -> bool:
+        if not self.axes.value:
+            self.work.say("axes = none: choose one or two", "bad")
+        return bool(self.axes.value)
 
     def told(self, visits: list[dict[str, Any]]) -> None:
         """Show the visits since the last look."""
@@ -135,8 +162,8 @@ class Map:
         """Show the map at the end, and offer its files."""
         self.found = found
         self._said.object = pre(found["text"]) + "".join(text(each) for each in found["findings"])
-        self.saved.objects = [save(f"map{ending}", content) for ending, content in found["files"].items()]
         self.draw()
+        self._show_made()
 
     @property
     def cells(self) -> xr.Dataset | None:
@@ -150,13 +177,15 @@ class Map:
         data = self.cells
         if data is None:
             return
-        shown = {str(name): v for name, v in data.data_vars.items() if v.ndim == len(self.axes.value)
-                 and v.dtype.kind == "f"}  # fmt: skip
-        options = {f"{label_of(v).long_name or name} [{label_of(v).units}]": name for name, v in shown.items()}
+        shown = {str(name): v for name, v in data.data_vars.items() if {*v.dims} <= {*AXES} and v.dtype.kind == "f"}
+        for limit in self.limits.values:
+            shown |= {f"{name} of {limit}": data[name].sel(limit=limit) for name in data if "limit" in data[name].dims}
+        options = {name if " of " in name else f"{label_of(v).long_name or name} [{label_of(v).units}]": name
+                   for name, v in shown.items()}  # fmt: skip
         if self.column.options != options:
             self.column.options = options
         name = self.column.value if self.column.value in shown else next(iter(shown))
-        self._map.object = cells(data[name])
+        self._map.object = cells(shown[name])
         rows = [
             [str(one["visit"]), *(number(value) for value in {**one["at"], **one["inputs"]}.values()), number(one["j"]),
              number(one["regret"], ".3g")]
@@ -167,33 +196,71 @@ class Map:
             heads = ("visit", *last["at"], *last["inputs"], "J [%]", "regret [%]")
             self._list.object = table(heads, rows, numbers=range(len(heads)))
 
-    def compare(self, name: str, content: bytes | str) -> None:
-        """Subtract the map of a file from the one that was found."""
+    def sweep(self) -> None:
+        """Make the map of the same engine in the conventional way."""
+        if self._has_axes():
+            self.run("sweeping", work.made_maps, self.sweep_script(), ENDINGS, done=self._made)
+
+    def smooth(self) -> None:
+        """Smooth the map that was sought."""
+        lines = self._sought_lines()
+        if lines:
+            options = {"weight": self.weight.value, "tolerance": self.tolerance.value}
+            smooth = Call("maps.smooth_map", (Named("sought"),), options)
+            command = ("map", "smooth", "map.nc", *(f"--{name}={value!r}" for name, value in options.items()))
+            script = Script((*lines, ("smooth", smooth)), command, ("smooth",))
+            self.run("smoothing", work.made_maps, script, ENDINGS, done=self._made)
+
+    def _made(self, made: dict[str, Any]) -> None:
+        self.made |= made
+        self._show_made()
+
+    def _show_made(self) -> None:
+        """Set the sweep's map and the smoothed one beside that of the search, and offer all files."""
+        shown = {name: one for name, one in self.made.items() if name != "achieved"}
+        self._beside.objects = [side_by_side(*(cells(one["cells"]["soc_cad"], name) for name, one in shown.items()))]
+        said = ""
+        if "achieved" in self.made:
+            loss = self.made["achieved"]["loss"]
+            said = text(f"swept: every cell at every {_STEP_CAD:g} °CA; the smoothed map loses at most "
+                        f"{number(loss.max())} of the efficiency of its cell")  # fmt: skip
+        self._beside_said.object = said
+        files = {"map": self.found.get("files", {}), **{name: one["files"] for name, one in shown.items()}}
+        self.saved.objects = [save(f"{stem}{ending}", content) for stem, own in files.items()
+                              for ending, content in own.items()]  # fmt: skip
+
+    def _sought_lines(self) -> tuple[tuple[str, Any], ...]:
+        """Give the line that reads the map that was sought, none and a sentence where there is none."""
         if ".nc" not in self.found.get("files", {}):
-            self._compared.object = text("seek a map first, to its end", "bad")
+            self.work.say("seek a map first, to its end", "bad")
+            return ()
+        folder = self.session.folder / "maps"
+        folder.mkdir(exist_ok=True)
+        (folder / "map.nc").write_bytes(self.found["files"][".nc"])
+        return (("sought", Call("maps.read_map", (File(folder / "map.nc"),))),)
+
+    def compare(self, name: str, content: bytes) -> None:
+        """Subtract the map of a file from the one that was found."""
+        lines, file = self._sought_lines(), self.take(name, content)
+        if not lines or file is None:
             return
-        own = self.session.folder / "maps"
-        own.mkdir(exist_ok=True)
-        try:
-            file = self.session.take(name, content).path
-            self.session.files.pop(file.name)
-        except DataError as error:
-            self._compared.object = text(str(error), "bad")
-            return
-        (own / "map.nc").write_bytes(self.found["files"][".nc"])
-        lines = (
-            ("first", Call("maps.read_map", (File(file),))),
-            ("second", Call("maps.read_map", (File(own / "map.nc"),))),
-            ("difference", Call("maps.compare_maps", (Named("first"), Named("second")))),
-        )
+        lines = (("other", Call("maps.read_map", (File(file),))), *lines,
+                 ("difference", Call("maps.compare_maps", (Named("other"), Named("sought")))))  # fmt: skip
         script = Script(lines, ("map", "diff", file_word(file.name), "map.nc"), ("difference",))
-        self.same.show(script)
 
         def done(found: dict[str, Any]) -> None:
             data = found["difference"]
-            said = f"largest difference {number(data['largest_difference'])}, root mean square "
-            said += f"{number(data['rms_difference'])} {label_of(data['difference']).units}"
+            largest, rms = (number(data[name]) for name in _COMPARED)
+            said = f"largest difference {largest}, root mean square {rms} {label_of(data['difference']).units}"
             self._compared.object = text(said)
             self._map.object = cells(data["difference"])
 
-        self.work.begin(f"comparing with {file.name}", work.run, script, done=done, seconds=READ_S)
+        self.run(f"comparing with {file.name}", work.run, script, done=done, seconds=READ_S)
+
+
+def _grid(spans: dict[str, Any]) -> dict[str, list[float]]:
+    return {name: np.linspace(*span).tolist() for name, span in spans.items()}
+
+
+def _over(spans: dict[str, Any]) -> list[str]:
+    return [f"--over={name}={low!r}:{high!r}:{n}" for name, (low, high, n) in spans.items()]

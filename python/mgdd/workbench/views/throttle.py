@@ -6,16 +6,14 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from mgdd.errors import DataError
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, File, Named, Script
+from mgdd.workbench.drop import dropper
 from mgdd.workbench.jobs import READ_S
 from mgdd.workbench.parts import (
-    SameAs,
-    Work,
+    View,
     button,
     column,
-    dropper,
     number,
     page,
     panel,
@@ -33,19 +31,19 @@ _MODELS = ("auto", "first_principle", "pw_r", "pw_w", "pw_p")
 _FIGURES = ("settling_ms", "overshoot_deg", "static_error_deg", "rms_error_deg", "mse_deg2")
 
 
-class Throttle:
+class Throttle(View):
     """The seventh page."""
 
     title = "Throttle"
 
     def __init__(self, session: Session) -> None:
+        super().__init__(session)
         widgets = panel().widgets
-        self.session, self.work, self.same = session, Work(), SameAs()
         self.log: Path | None = None
         self.numbers: dict[str, dict[str, float]] = {}  # of controllers that were tuned
         self.found: dict[str, Any] = {}
         self.runs: dict[str, Any] = {}
-        self.drop = dropper(self.take, MOST_FILE_MB)
+        self.drop = dropper(self.read, MOST_FILE_MB)
         self.model = widgets.Select(label="model", options=[*_MODELS], width=160)
         self.preset = widgets.Select(label="throttle", options=["P1", "P2", "P3"], width=120)
         self.kinds = widgets.MultiChoice(label="controllers", options=[*KINDS], value=["guided", "pid"], width=300)
@@ -64,21 +62,18 @@ class Throttle:
             self._tuned, self.saved, self.same.layout,
         )  # fmt: skip
 
-    def take(self, name: str, content: bytes | str) -> None:
-        """Take a log, and draw it."""
-        try:
-            one = self.session.take(name, content)
-        except DataError as error:
-            self.work.say(str(error), "bad")
+    def read(self, name: str, content: bytes) -> None:
+        """Read a log, and draw it."""
+        file = self.take(name, content)
+        if file is None:
             return
-        self.session.files.pop(one.path.name)  # of the throttle, not one of the engine
-        self.log = one.path
-        script = Script((("log", Call("io.read_throttle_log", (File(one.path),))),), (), ("log",))
+        self.log = file
+        script = Script((("log", Call("io.read_throttle_log", (File(file),))),), (), ("log",))
 
         def done(found: dict[str, Any]) -> None:
             self._drawn.objects = self._pair(found["log"], ["angle_deg"], ["duty"])
 
-        self.work.begin(f"reading {one.path.name}", work.run, script, done=done, seconds=READ_S)
+        self.work.begin(f"reading {name}", work.run, script, done=done, seconds=READ_S)
 
     def _pair(self, data: Any, *groups: list[str]) -> list[Any]:
         every = -(-data.sizes["time_s"] // work.MOST_POINTS)
@@ -101,7 +96,6 @@ class Throttle:
             self.work.say("drop a log first", "bad")
             return
         script = self.fit_script(self.log)
-        self.same.show(script)
 
         def done(found: dict[str, Any]) -> None:
             self.found = found
@@ -109,7 +103,7 @@ class Throttle:
             self._drawn.objects = self._pair(found["run"], ["angle_deg", "model_deg"], ["residual_deg"])
             self.saved.objects = [save("fit.toml", found["toml"].encode())]
 
-        self.work.begin("identifying", work.identified, script, done=done)
+        self.run("identifying", work.identified, script, done=done)
 
     def _controller(self, kind: str) -> tuple[tuple[str, Any], ...]:
         throttle = Call("throttle", of=Call("presets.load", (self.preset.value,)), reads=True)
@@ -163,7 +157,6 @@ class Throttle:
         command = ("throttle", "tune", f"--controller={kind}", f"--preset={self.preset.value}",
                    f"--budget={self.budget.value}")  # fmt: skip
         script = Script((("tuning", tuning),), command, ("tuning",))
-        self.same.show(script)
 
         def done(found: dict[str, Any]) -> None:
             self.numbers[f"{kind} {self.preset.value}"] = found["numbers"]
@@ -172,7 +165,7 @@ class Throttle:
             rows = [[escape(name), number(value)] for name, value in found["numbers"].items()]
             self._tuned.object = text(said) + table(("number", "tuned"), rows, numbers=(1,))
 
-        self.work.begin(f"tuning {kind}", work.tuned, script, done=done)
+        self.run(f"tuning {kind}", work.tuned, script, done=done)
 
     def exported(self) -> None:
         """Write a controller as C++."""
@@ -181,9 +174,8 @@ class Throttle:
                     {"throttle": Named("throttle"), "delay_samples": 1})  # fmt: skip
         command = ("throttle", "export", kind, f"--preset={self.preset.value}", "--delay-samples=1", "-o", "controller")
         script = Script((*self._controller(kind), ("run", made)), command, ("run",))
-        self.same.show(script)
 
         def done(content: bytes) -> None:
             self.saved.objects = [save(f"{kind}.zip", content)]
 
-        self.work.begin(f"writing {kind} as C++", work.controller_files, script, done=done)
+        self.run(f"writing {kind} as C++", work.controller_files, script, done=done)

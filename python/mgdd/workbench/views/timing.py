@@ -10,29 +10,26 @@ from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, Named, Script
-from mgdd.workbench.parts import Form, SameAs, Work, button, column, number, page, panel, side, table, text
+from mgdd.workbench.parts import Sliders, View, button, column, number, page, panel, side, table, text
 from mgdd.workbench.pictures import COLOURS, canvas, line, mark, side_by_side, with_legend
 from mgdd.workbench.session import MEAN, file_word, words
 from mgdd.workbench.views.files import Files
 
-_LIMITS = {
-    "p_max_bar": ("limit of p_max_bar", "none"),
-    "dp_max_bar_per_cad": ("limit of dp_max_bar_per_cad", "none"),
-}
+_LIMITS = {"p_max_bar": ("p_max at most [bar]", 400.0), "dp_max_bar_per_cad": ("dp_max at most [bar/°CA]", 30.0)}
 _OPEN = {"not determined": "no direction is determined", "earlier": "earlier", "later": "later"}
 
 
-class Timing:
+class Timing(View):
     """The fourth page."""
 
     title = "Best timing"
 
     def __init__(self, files: Files) -> None:
-        widgets = panel().widgets
-        self.files, self.work, self.same = files, Work(), SameAs()
+        super().__init__(files.session)
+        widgets, self.files = panel().widgets, files
         self.rows: list[dict[str, Any]] = []
         self.traces = widgets.MultiChoice(label="traces, all of one engine", options=[], width=420)
-        self.limits = Form(_LIMITS)
+        self.limits = Sliders(_LIMITS)
         self._answers = page(text("Drop traces and state the engine on the first page.", "quiet"))
         self._picture = column()
         start = button("Calibrate", self.calibrate, first=True)
@@ -43,7 +40,7 @@ class Timing:
 
     def show(self) -> None:
         """Offer the files that were read."""
-        names = [name for name, one in self.files.session.files.items() if one.check is not None]
+        names = [name for name, one in self.session.files.items() if one.check is not None]
         if self.traces.options != names:
             before = self.traces.options
             self.traces.options = names
@@ -52,9 +49,9 @@ class Timing:
 
     def script(self) -> Script:
         """Write the work: all traces are read in the same way, as the command does."""
-        session = self.files.session
+        session = self.session
         chosen = [session.files[name] for name in self.traces.value]
-        lines = list(session.engine_lines())
+        lines = list(session.engine_lines(chosen[0]))
         named = []
         for k, one in enumerate(chosen, 1):
             lines.append((f"trace_{k}", session.trace_line(one)))
@@ -65,7 +62,7 @@ class Timing:
         fuel_mg = session.point.get("fuel_mg")
         heat = None
         if fuel_mg is not None:
-            cylinder = presets.load(session.preset).cylinder.replace(**session.cylinder)
+            cylinder = presets.load(session.preset_file).cylinder.replace(**session.cylinder)
             heat = fuel_mg * cylinder.lower_heating_value_mj_per_kg
         options = {"point": Named("point"), "limits": limits, "fuel_heat_j": heat, **chosen[0].pegging}
         lines.append(("rows", Call("identify.best_timing", (named, Named("cylinder")), options, watched="progress")))
@@ -78,8 +75,8 @@ class Timing:
 
     def calibrate(self) -> None:
         """Begin, with progress and a button that cancels."""
-        files = self.files.session.files
-        if not self.traces.value or not self.files.session.preset:
+        files = self.session.files
+        if not self.traces.value or not self.session.preset:
             self.work.say("drop traces and state the engine on the first page", "bad")
             return
         first = files[self.traces.value[0]]
@@ -93,8 +90,7 @@ class Timing:
         except ParameterError as error:  # a geometry that is none
             self.work.say(str(error), "bad")
             return
-        self.same.show(script)
-        self.work.begin("calibrating; about a minute", work.timed, script, done=self.answer)
+        self.run("calibrating; about a minute", work.timed, script, done=self.answer)
 
     def answer(self, rows: list[dict[str, Any]]) -> None:
         """Show the range over the plausible models."""
