@@ -34,7 +34,7 @@ pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel-su
   justify-content: space-between; gap: 12px; border: 0; padding: 1px 0; text-align: right; white-space: normal; }
   td::before { content: attr(title); opacity: .75; text-align: left; }
   tr { border-bottom: 1px solid var(--panel-border-color); } }
-.check b { display: inline-block; min-width: 9em; }
+.check b { display: inline-block; min-width: 9em; margin-right: 6px; }
 """
 _BADGES = {"no fault found": "good", "open": "open", "doubt": "doubt", "fail": "fail"}
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 COLOURS = ("#1f83c9", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 GREY = "#8a8f98"
 _HEIGHT = 320  # pixels
+_TICKS = 5  # or their numbers run into each other on a telephone
+_COLUMNS = "repeat(auto-fit, minmax(min(460px, 100%), 1fr))"
 
 
 def bokeh(module: str) -> Any:
@@ -45,15 +47,18 @@ def _dressed(figure: Any) -> Any:
     figure.toolbar.logo = None
     for axis in figure.axis:
         axis.update(axis_label_text_font_size="12px", major_label_text_font_size="11px")
+        if hasattr(axis.ticker, "desired_num_ticks"):
+            axis.ticker.desired_num_ticks = _TICKS
     return figure
 
 
 def side_by_side(*figures: Any) -> Any:
     """Set figures side by side, as many as fit."""
-    pane, flex = import_extra("panel", "workbench", "the workbench"), {"flex": "1 1 460px", "min-width": "280px"}
+    pane = import_extra("panel", "workbench", "the workbench")
     return pane.FlexBox(
-        *(pane.Column(pane.pane.Bokeh(each, sizing_mode="stretch_width"), styles=flex) for each in figures),
-        sizing_mode="stretch_width", gap="4px",
+        *(pane.Column(pane.pane.Bokeh(each, sizing_mode="stretch_width"), styles={"min-width": "0"})
+          for each in figures),
+        sizing_mode="stretch_width", gap="4px", styles={"display": "grid", "grid-template-columns": _COLUMNS},
     )  # fmt: skip
 
 
@@ -107,15 +112,18 @@ def traces(datasets: Mapping[str, xr.Dataset], name: str, *, over: str = "crank_
 
 def spectrum(datasets: Mapping[str, xr.Dataset]) -> Any:
     """Draw the spectra of the cycles with the knock band, the frequency of ringing and the first tangential mode."""
-    figure = traces(datasets, "pressure_psd_bar2_per_khz", over="frequency_khz", log="y")
+    name = "pressure_psd_bar2_per_khz"
+    figure = traces(datasets, name, over="frequency_khz", log="y")
     first = next(iter(datasets.values()))
+    ends = [float(first[name].min()), float(first[name].max())]
+    figure.yaxis.axis_label = f"power density [{label_of(first[name]).units}]"
+    figure.height = _HEIGHT + 40  # two more lines of the legend
     for edge in first.attrs.get("knock_band_hz", ()):
         mark(figure, "height", 1e-3 * edge, GREY)
-    for name, colour in (("tangential_mode_khz", COLOURS[1]), ("ringing_frequency_khz", COLOURS[2])):
-        if name in first and np.isfinite(first[name]):
-            label = f"{label_of(first[name]).long_name}: {float(first[name]):.2f} kHz"
-            mark(figure, "height", float(first[name]), colour)
-            figure.line([], [], color=colour, line_dash="dashed", legend_label=label)
+    for mode, colour in (("tangential_mode_khz", COLOURS[1]), ("ringing_frequency_khz", COLOURS[2])):
+        if mode in first and np.isfinite(first[mode]):
+            at = float(first[mode])
+            line(figure, [at, at], ends, f"{label_of(first[mode]).long_name}: {at:.2f} kHz", colour, dash="dashed")
     return with_legend(figure, columns=1)
 
 
@@ -184,6 +192,7 @@ def cells(table: xr.DataArray, title: str = "") -> Any:
     figure.text("x", "y", text="text", source=source, text_align="center", text_baseline="middle",
                 text_color="ink", text_font_size="12px")  # fmt: skip
     figure.add_layout(models.ColorBar(color_mapper=mapper, width=10), "right")
+    figure.title.text_font_size = "11px"  # it fits a telephone
     return _dressed(figure)
 
 

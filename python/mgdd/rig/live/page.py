@@ -27,7 +27,7 @@ _BROKEN_S = 3
 _TEMPLATE = """{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 8px; font-family: sans-serif; }
-body:has(#dark) { background: #20262b; color: #e0e0e0; }
+body:has(#dark) { background: #15191c; color: #e0e0e0; }
 #lost { display: none; position: fixed; inset: 0 0 auto 0; padding: 10px; z-index: 99; background: #c62828;
 color: white; font: bold 16px sans-serif; }</style>
 {% endblock %}

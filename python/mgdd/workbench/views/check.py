@@ -97,7 +97,8 @@ class Check(View):
         one = self.files.file
         self.undo.disabled = one is None or not one.before
         speed = self._speed_of_file
-        self.own_speed.visible = speed is not None and one is not None and "speed_rpm" not in one.options
+        in_force = None if one is None else one.options.get("speed_rpm", self.session.point.get("speed_rpm"))
+        self.own_speed.visible = speed is not None and speed != in_force
         self.own_speed.label = f"Take the speed of the file, {number(speed)} rpm"
         if one is None:
             self._head.object, self._checks.objects = text("Drop a file on the first page.", "quiet"), []

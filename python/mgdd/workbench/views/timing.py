@@ -28,7 +28,7 @@ class Timing(View):
         super().__init__(files.session)
         widgets, self.files = panel().widgets, files
         self.rows: list[dict[str, Any]] = []
-        self.traces = widgets.MultiChoice(label="traces, all of one engine", options=[], width=420)
+        self.traces = widgets.MultiChoice(label="traces, all of one engine", options=[], width=300)
         self.limits = Sliders(_LIMITS)
         self._answers = page(text("Drop traces and state the engine on the first page.", "quiet"))
         self._picture = column()
