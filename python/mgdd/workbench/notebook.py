@@ -6,7 +6,7 @@ from typing import Any
 
 from mgdd.errors import ParameterError
 from mgdd.workbench.parts import panel
-from mgdd.workbench.pictures import by_cycle, cells, runs, traces
+from mgdd.workbench.pictures import cells, runs, traces
 
 
 def view(result: Any) -> Any:
@@ -61,7 +61,7 @@ def _way(data: Any, name: str) -> Any:
     if dims in (("crank_angle_cad",), ("cycle", "crank_angle_cad")):
         return lambda: traces({name: data}, name)
     if dims == ("cycle",):
-        return lambda: by_cycle({name: data}, name)
+        return lambda: traces({name: data}, name, over="cycle")
     if dims == ("time_s",):
         return lambda: runs(data, [name])
     numbers = all(dim in data and data[dim].dtype.kind in "fiu" for dim in dims)

@@ -9,12 +9,11 @@ import numpy as np
 
 from mgdd.io.extras import import_extra
 from mgdd.results.labels import label_of
+from mgdd.rig.live.figures import COLOURS, plain, with_legend
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Distinct to the colour-blind, too, on white and on black.
-COLOURS = ("#1f83c9", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 GREY = "#8a8f98"
 _HEIGHT = 320  # pixels
 _TICKS = 5  # or their numbers run into each other on a telephone
@@ -82,31 +81,20 @@ def mark(figure: Any, along: str, at: float, colour: str = "#c62828") -> None:
     figure.add_layout(bokeh("models").Span(location=at, dimension=along, line_dash="dashed", line_color=colour))
 
 
-def with_legend(figure: Any, columns: int = 3) -> Any:
-    """Put the legend above the axes, where it hides nothing."""
-    if figure.legend:
-        legend = figure.legend[0]
-        legend.update(
-            orientation="horizontal", ncols=columns, click_policy="hide", label_text_font_size="12px", padding=2,
-            margin=0, border_line_color=None, background_fill_alpha=0.0,
-        )  # fmt: skip
-        figure.add_layout(legend, "above")
-    return figure
-
-
 def traces(datasets: Mapping[str, xr.Dataset], name: str, *, over: str = "crank_angle_cad", log: str = "") -> Any:
     """Draw a variable of one record or several over another; of many cycles the cloud, and their mean."""
     first = next(iter(datasets.values()))
-    figure = canvas(axis_text(first[over], over), axis_text(first[name], name), log=log)
+    along = "cycle [-]" if over == "cycle" else axis_text(first[over], over)
+    figure = canvas(along, axis_text(first[name], name), log=log)
     alone = len(datasets) == 1
     for colour, (label, data) in zip(COLOURS * len(datasets), datasets.items(), strict=False):
         mean = data
-        if "cycle" in data[name].dims:
+        if "cycle" in data[name].dims and over != "cycle":
             x, y = np.asarray(data[over].broadcast_like(data[name])), np.asarray(data[name])
             x = x if x.shape == y.shape else x.T
             figure.multi_line([*x], [*y], line_color=GREY if alone else colour, line_alpha=0.25, line_width=0.8)
             mean = data.mean("cycle", keep_attrs=True)
-        line(figure, mean[over], mean[name], _short(label), colour)
+        line(figure, mean[over], mean[name], plain(label), colour, points=over == "cycle")
     return with_legend(figure)
 
 
@@ -151,15 +139,6 @@ def cycle_map(data: xr.Dataset, name: str) -> Any:
     return figure
 
 
-def by_cycle(datasets: Mapping[str, xr.Dataset], name: str) -> Any:
-    """Draw a figure from cycle to cycle."""
-    first = next(iter(datasets.values()))
-    figure = canvas("cycle [-]", axis_text(first[name], name))
-    for colour, (label, data) in zip(COLOURS * len(datasets), datasets.items(), strict=False):
-        line(figure, data["cycle"], data[name], _short(label), colour, points=True)
-    return with_legend(figure)
-
-
 def cells(table: xr.DataArray, title: str = "") -> Any:
     """Draw a map of one axis as a line, of two as coloured cells with their values."""
     axes = [str(dim) for dim in table.dims]
@@ -194,12 +173,6 @@ def cells(table: xr.DataArray, title: str = "") -> Any:
     figure.add_layout(models.ColorBar(color_mapper=mapper, width=10), "right")
     figure.title.text_font_size = "11px"  # it fits a telephone
     return _dressed(figure)
-
-
-def _short(label: str, longest: int = 34) -> str:
-    """Cut a name, and keep it from being taken for mathematics, as Bokeh does between dollars."""
-    cut = label if len(label) <= longest else f"{label[: longest - 1]}…"
-    return cut.replace("$$", "$ $").replace("\\[", "\\ [").replace("\\(", "\\ (")
 
 
 def runs(data: xr.Dataset, names: Sequence[str], over: str = "time_s") -> Any:

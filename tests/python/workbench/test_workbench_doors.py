@@ -57,6 +57,7 @@ def test_an_own_engine_judges_as_its_command_does(bench: Any, folder: Path, caps
     assert float(other) != float(check.analysis["mean_n_compression"])
 
 
+@pytest.mark.slow
 def test_an_own_engine_can_be_sought_on(bench: Any, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "mine.toml").write_bytes(own_engine())
     bench.files.add_engine("mine.toml", own_engine())
@@ -67,21 +68,21 @@ def test_an_own_engine_can_be_sought_on(bench: Any, folder: Path, capsys: pytest
     assert asked["inputs"] == pytest.approx(search.found["result"]["inputs"], rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("content", "sentence"),
-    [(b"\x00", "bad.toml"), (b"bore_mm = 3", "bad.toml"), (b"kind = 'throttle'\nformat = 1\n", "throttle"),
-     (own_engine(0.5), "compression_ratio = 0.5")],
-)  # fmt: skip
-def test_a_preset_that_is_none_is_a_sentence(bench: Any, content: bytes, sentence: str) -> None:
-    bench.files.add_engine("bad.toml", content)
-    assert sentence in said(bench.files.work)
-    assert str(bench.session.folder) not in said(bench.files.work)
-    assert "bad.toml" not in bench.files.engine.options
+def test_a_preset_that_is_none_is_a_sentence(bench: Any) -> None:
+    for content, sentence in (
+        (b"\x00", "bad.toml"), (b"bore_mm = 3", "bad.toml"), (b"kind = 'throttle'\nformat = 1\n", "throttle"),
+        (own_engine(0.5), "compression_ratio = 0.5"),
+    ):  # fmt: skip
+        bench.files.add_engine("bad.toml", content)
+        assert sentence in said(bench.files.work)
+        assert str(bench.session.folder) not in said(bench.files.work)
+        assert "bad.toml" not in bench.files.engine.options
 
 
 # --- the speed that stands in a file ------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_speed_of_a_file_is_taken_by_a_click(bench: Any, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     turned = 720.0 * np.arange(len(CYCLES))[:, None] + FULL - FULL[0]
     rows = "".join(f"{t:.8f},{p:.5f}\n" for t, p in zip(turned.ravel() / (6.0 * 1230.0), CYCLES.ravel(), strict=True))
@@ -132,27 +133,21 @@ def test_a_record_of_a_search_is_replayed(bench: Any, folder: Path) -> None:
     assert np.array_equal(own._sources["p_max_bar"].data["y"], done.dataset["limits"].sel(limit="p_max_bar"))
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "sentence"),
-    [("a.csv", b"1", "a.csv: must be an experiment (.toml) or a record (.rec)"),
-     ("a.toml", b"1", "a.toml: not valid TOML"),
-     ("a.toml", SEEK.replace('"seek"', '"track"').replace("[seek]", "[track]").encode(), "a.toml"),
-     ("a.toml", b'kind = "experiment"\nformat = 1\ntask = "track"\n', "use mgdd rig run for another task"),
-     ("a.toml", SEEK.replace("seed = 3", 'mode = "bench"').encode(), "needs [bus] connection"),
-     ("a.toml", SEEK.replace("40", "-1").encode(), "cycles = -1"),
-     ("a.rec", b"1", "a.rec: not a record of mgdd")],
-)  # fmt: skip
-def test_what_is_no_search_is_a_sentence(bench: Any, name: str, content: bytes, sentence: str) -> None:
-    bench.search.open(name, content)
-    assert sentence in said(bench.search.work).replace("&#x27;", "'")
-    assert str(bench.session.folder) not in said(bench.search.work)
-
-
-def test_nobody_arms_a_bench_by_a_file(bench: Any) -> None:
-    armed = SEEK.replace("seed = 3", 'mode = "bench"') + '[bus]\nconnection = "socketcan:can0"\npace = "real_time"\n'
-    bench.search.open("bench.toml", armed.encode())
-    assert "arm" in said(bench.search.work)
-    assert bench.search.found == {}
+def test_what_is_no_search_is_a_sentence_and_nobody_arms_a_bench_by_a_file(bench: Any) -> None:
+    on_a_bus = 'mode = "bench"\n[bus]\nconnection = "socketcan:can0"\npace = "real_time"'
+    for name, content, sentence in (
+        ("a.csv", "1", "a.csv: must be an experiment (.toml) or a record (.rec)"),
+        ("a.toml", "1", "a.toml: not valid TOML"),
+        ("a.toml", SEEK.replace("40", "-1"), "cycles = -1"),
+        ("a.toml", 'kind = "experiment"\nformat = 1\ntask = "track"\n', "use mgdd rig run for another task"),
+        ("a.toml", SEEK.replace("seed = 3", 'mode = "bench"'), "needs [bus] connection"),
+        ("a.toml", SEEK.replace("seed = 3", on_a_bus), "arm"),
+        ("a.rec", "1", "a.rec: not a record of mgdd"),
+    ):
+        bench.search.open(name, content.encode())
+        assert sentence in said(bench.search.work).replace("&#x27;", "'")
+        assert str(bench.session.folder) not in said(bench.search.work)
+        assert bench.search.found == {}
 
 
 # --- the sweep beside the sought map, and smoothing ---------------------------------------------------------

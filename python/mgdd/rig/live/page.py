@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mgdd.io.extras import import_extra
+from mgdd.rig.live.figures import COLOURS, plain, with_legend
 from mgdd.rig.live.live_data import EDGES_US, Line, LiveData, thinned
 from mgdd.rig.live.server import serve_here
 from mgdd.rig.live.sources import Source
@@ -19,10 +20,9 @@ _LOG = logging.getLogger(__name__)
 _TICK_MS, _ALIVE_TICKS = 500, 2
 _UNSEEN = 3  # updates that a slow browser may owe: what is more would pile up here
 _WINDOWS_S = {"10 s": 10.0, "60 s": 60.0, "all": np.inf}
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # distinct to the colour-blind, too
 _GOOD = {"run": "#2e7d32", "armed": "#b26a00", "init": "#555", "limp": "#c62828", "fault": "#c62828"}
 _SD_OF_95 = 1.96
-_HEIGHT, _LEGEND_ROW, _WIDE_LABEL, _LONGEST_LABEL = 240, 22, 26, 34  # pixels, and letters
+_HEIGHT, _LEGEND_ROW, _WIDE_LABEL = 240, 22, 26  # pixels, and letters
 _BROKEN_S = 3
 _TEMPLATE = """{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
@@ -37,12 +37,6 @@ Use Ctrl-C where the rig runs, or the emergency stop; then load the page again.<
 <script>window.mgdd_updated = Date.now() + 20000; setInterval(() => {
 document.getElementById("lost").style.display = Date.now() - window.mgdd_updated > BROKEN ? "block" : "none" }, 500)
 </script>{% endblock %}""".replace("BROKEN", str(1000 * _BROKEN_S))
-
-
-def _plain(text: str) -> str:
-    """Keep what stands on a canvas from being taken for mathematics, as Bokeh does between dollars."""
-    short = text if len(text) <= _LONGEST_LABEL else f"{text[: _LONGEST_LABEL - 1]}…"
-    return short.replace("$$", "$ $").replace("\\[", "\\ [").replace("\\(", "\\ (")
 
 
 def _bokeh(module: str) -> Any:
@@ -157,17 +151,17 @@ class _View:
                 x_range=self._range, x_axis_label="time since the start of the record [s]",
                 height=_HEIGHT + _LEGEND_ROW * (len(lines) // (1 if narrow else 2)),
             )  # fmt: skip
-            figure.yaxis.axis_label = _plain(axis)
+            figure.yaxis.axis_label = plain(axis)
             for place, line in enumerate(lines):
                 source = self._models.ColumnDataSource({name: [] for name in ("x", "y", "low", "high")})
                 self._lines.append((line, source))
-                colour, label = _COLOURS[place % len(_COLOURS)], _plain(line.label)
+                colour, label = COLOURS[place % len(COLOURS)], plain(line.label)
                 if line.sd_column is not None:
                     figure.varea(
                         "x", "low", "high", source=source, color=colour, alpha=0.2, legend_label=f"{label}, 95 %"
                     )
                 figure.line("x", "y", source=source, color=colour, line_width=1.5, legend_label=label)
-            _with_legend(figure, 1 if narrow else 2)
+            with_legend(figure, 1 if narrow else 2)
             figures.append(figure)
         if data.counts:
             figure = self._figure(
@@ -177,9 +171,9 @@ class _View:
             for place, name in enumerate(sorted(data.counts)):
                 source = self._bars[name] = self._models.ColumnDataSource({n: [] for n in ("left", "right", "top")})
                 figure.quad(
-                    "left", "right", "top", 0.5, source=source, color=_COLOURS[place], alpha=0.5, legend_label=name
+                    "left", "right", "top", 0.5, source=source, color=COLOURS[place], alpha=0.5, legend_label=name
                 )
-            _with_legend(figure, 2)
+            with_legend(figure, 2)
             figures.append(figure)
         self._figures.children = figures
 
@@ -200,15 +194,6 @@ def _asked_theme(document: Any) -> str:
     request = getattr(document.session_context, "request", None)
     asked: list[bytes] = request.arguments.get("theme", [b""]) if request is not None else [b""]
     return asked[0].decode(errors="replace")
-
-
-def _with_legend(figure: Any, columns: int) -> None:
-    legend = figure.legend[0]
-    legend.update(
-        orientation="horizontal", click_policy="hide", label_text_font_size="12px", padding=2, margin=0, spacing=8,
-        border_line_color=None, ncols=columns,
-    )  # fmt: skip
-    figure.add_layout(legend, "above")
 
 
 def _status_text(source: Source, trouble: str) -> str:

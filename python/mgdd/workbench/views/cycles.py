@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd.results.labels import label_of
 from mgdd.workbench import work
 from mgdd.workbench.parts import View, button, column, page, panel, save, side, text
-from mgdd.workbench.pictures import by_cycle, cycle_map, side_by_side, spectrum, traces
+from mgdd.workbench.pictures import cycle_map, side_by_side, spectrum, traces
 from mgdd.workbench.views.files import Files
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class Cycles(View):
         drawn = [traces(shown, name) for name in ("pressure_bar", _HEAT) if all(name in one for one in shown.values())]
         drawn.append(traces(shown, "pressure_bar", over="volume_l", log="xy"))
         if self.figure.value and all(self.figure.value in one for one in shown.values()):
-            drawn.append(by_cycle(shown, self.figure.value))
+            drawn.append(traces(shown, self.figure.value, over="cycle"))
         if all(_SPECTRUM in one for one in shown.values()):
             drawn.append(spectrum(shown))
         if "cycle" in first.dims:

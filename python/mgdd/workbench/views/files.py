@@ -13,9 +13,9 @@ from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, Error
 from mgdd.workbench import work
 from mgdd.workbench.drop import dropper
+from mgdd.workbench.forms import Form
 from mgdd.workbench.jobs import READ_S
 from mgdd.workbench.parts import (
-    Form,
     View,
     badge,
     button,

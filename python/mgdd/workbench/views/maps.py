@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from mgdd.results.labels import label_of
+from mgdd.rig.live.figures import COLOURS
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, File, Named, Script
 from mgdd.workbench.drop import dropper
+from mgdd.workbench.forms import Form, Ranges
 from mgdd.workbench.jobs import READ_S
-from mgdd.workbench.parts import Form, View, button, card, column, number, page, panel, pre, save, side, table, text
-from mgdd.workbench.pictures import COLOURS, canvas, cells, line, side_by_side
+from mgdd.workbench.parts import View, button, card, column, number, page, panel, pre, save, side, table, text
+from mgdd.workbench.pictures import canvas, cells, line, side_by_side
 from mgdd.workbench.session import Session, file_word
 from mgdd.workbench.views.search import bench_lines, engine_form
 
@@ -37,14 +39,7 @@ class Map(View):
         super().__init__(session, stops=True)
         widgets = panel().widgets
         self.engine = engine_form(session)
-        self.axes = widgets.MultiChoice(label="axes, one or two", options=[*AXES], value=["speed_rpm", "fuel_mg"],
-                                        max_items=2, width=300)  # fmt: skip
-        self.ends = {
-            name: [widgets.FloatInput(label=f"{name} {end}", value=value, width=150)
-                   for end, value in zip(("from", "to"), ends[:2], strict=True)]
-            + [widgets.IntInput(label=f"{name} points", value=ends[2], start=2, end=12, width=150)]
-            for name, ends in AXES.items()
-        }  # fmt: skip
+        self.axes = Ranges("axes, one or two", AXES, ["speed_rpm", "fuel_mg"], most=2)
         self.limits = Form({"p_max_bar": ("limit of p_max_bar", "none")})
         self.timing = [widgets.FloatInput(label=f"soc_cad {end}", value=value, width=150)
                        for end, value in (("from", -20.0), ("to", 8.0))]  # fmt: skip
@@ -62,16 +57,15 @@ class Map(View):
         self.made: dict[str, Any] = {}  # maps of the sweep, and the smoothed one
         self.visited: list[dict[str, Any]] = []
         self._said, self._list, self._compared, self._beside_said = page(), page(), page(), page()
-        self._ends, self.saved = side(), side()
-        self.axes.param.watch(lambda _: self._show_ends(), "value")
+        self.saved = side()
         self._pictures, self._beside = side_by_side(None, None), column()
         self._map, self._regret = (column[0] for column in self._pictures)
         self._source: Any = None
         self.layout = column(
             page(text("A virtual engine: nothing here can drive a bench.", "quiet")),
-            side(self.engine, self.axes, *self.timing, *self.limits.widgets.values(), self.visits, self.seed,
-                 self.guided, self.wall_heat),
-            self._ends, side(button("Seek the map", self.begin, first=True), self.column), self.work.layout,
+            side(self.engine, *self.timing, *self.limits.widgets.values(), self.visits, self.seed, self.guided,
+                 self.wall_heat),
+            self.axes.layout, side(button("Seek the map", self.begin, first=True), self.column), self.work.layout,
             self._pictures, self._list, self._said,
             side(self.weight, self.tolerance, button("Smooth it", self.smooth), self.loss,
                  button("Sweep, optimise, smooth", self.sweep)),
@@ -79,18 +73,10 @@ class Map(View):
             card("Compare with a map from a file (DCM, CDFX, CSV, netCDF)", self.other, self._compared),
             self.same.layout,
         )  # fmt: skip
-        self._show_ends()
-
-    def _show_ends(self) -> None:
-        self._ends.objects = [field for name in self.axes.value for field in self.ends[name]]
-
-    @property
-    def _spans(self) -> dict[str, list[Any]]:
-        return {name: [field.value for field in self.ends[name]] for name in self.axes.value}
 
     def _bench(self) -> tuple[list[tuple[str, Any]], list[str], dict[str, Any]]:
         """Give the lines of the engine, the words of its command, and the axes."""
-        spans = self._spans
+        spans = self.axes.values
         inputs = {"soc_cad": tuple(field.value for field in self.timing)}
         lines, command = bench_lines(self.session, self.engine.value, inputs, self.limits.values, int(self.seed.value))
         own = tuple(f"--{name.replace('_', '-')}=" for name in spans)  # an axis is no fixed value
@@ -109,7 +95,7 @@ class Map(View):
                    "seed": int(self.seed.value)}  # fmt: skip
         inputs = {"soc_cad": tuple(field.value for field in self.timing)}
         lines.append(("found", Call("loop.seek_map", (Named("bench"), inputs, axes), options, watched="on_visit")))
-        command += _over(self._spans)
+        command += _over(self.axes.values)
         return Script(tuple(lines), ("map", "seek", *command, f"--visits={self.visits.value}"), ("found",))
 
     def sweep_script(self) -> Script:
@@ -128,7 +114,7 @@ class Map(View):
         ]
         engine = [word for word in command if not word.startswith(("--input", "--limit", "--seed"))]
         limits = [word for word in command if word.startswith("--limit")]
-        sweep = ("engine", "sweep", *engine, *_over({**self._spans, **timings}), "-o", "table.nc")
+        sweep = ("engine", "sweep", *engine, *_over({**self.axes.values, **timings}), "-o", "table.nc")
         best = ("map", "optimize", "table.nc", f"--maximize={_OBJECTIVE}", *limits, f"--max-loss={self.loss.value!r}",
                 "-o", "best.nc")  # fmt: skip
         smooth = ("map", "smooth", "best.nc", f"--weight={self.weight.value!r}", "-o", "swept.nc")
@@ -147,9 +133,9 @@ class Map(View):
         self.run("seeking the map", work.mapped, self.script(), ENDINGS, told=self.told, done=self.done)
 
     def _has_axes(self) -> bool:
-        if not self.axes.value:
+        if not self.axes.values:
             self.work.say("axes = none: choose one or two", "bad")
-        return bool(self.axes.value)
+        return bool(self.axes.values)
 
     def told(self, visits: list[dict[str, Any]]) -> None:
         """Show the visits since the last look."""

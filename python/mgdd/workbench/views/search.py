@@ -8,12 +8,14 @@ from typing import Any, cast
 import numpy as np
 
 from mgdd.results.labels import named_label
+from mgdd.rig.live.figures import COLOURS, with_legend
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, File, Named, Script
 from mgdd.workbench.drop import dropper
+from mgdd.workbench.forms import Form, Ranges
 from mgdd.workbench.jobs import READ_S
-from mgdd.workbench.parts import Form, View, button, card, column, page, panel, pre, side, text
-from mgdd.workbench.pictures import COLOURS, canvas, line, mark, side_by_side, with_legend
+from mgdd.workbench.parts import View, button, card, column, page, panel, pre, side, text
+from mgdd.workbench.pictures import canvas, line, mark, side_by_side
 from mgdd.workbench.session import MOST_FILE_MB, Session, file_word, words
 
 INPUTS = {"soc_cad": (-20.0, 5.0), "egr": (0.0, 0.3), "intake_pressure_kpa": (120.0, 180.0)}
@@ -28,33 +30,6 @@ _GUIDES = [_NO_GUIDE, "curve", "calibrated", "feed_forward"]
 def engine_form(session: Session) -> Any:
     """Offer the engines as plants."""
     return panel().widgets.Select(label="virtual engine", options=session.engines, value="puma_single", width=180)
-
-
-class Bounds:
-    """Inputs with their bounds, by mouse."""
-
-    def __init__(self, choices: Mapping[str, tuple[float, float]], least: str) -> None:
-        widgets = panel().widgets
-        self.which = widgets.MultiChoice(label="inputs", options=[*choices], value=[least], width=300)
-        self.ends: dict[str, tuple[Any, ...]] = {}
-        for name, ends in choices.items():
-            self.ends[name] = tuple(
-                widgets.FloatInput(label=f"{name} {end}", value=value, width=190)
-                for end, value in zip(("from", "to"), ends, strict=True)
-            )
-        self._shown = side()
-        self.which.param.watch(lambda _: self.show(), "value")
-        self.layout = column(self.which, self._shown)
-        self.show()
-
-    def show(self) -> None:
-        """Show the bounds of the chosen inputs."""
-        self._shown.objects = [field for name in self.which.value for field in self.ends[name]]
-
-    @property
-    def values(self) -> dict[str, tuple[float, float]]:
-        """Bounds by input."""
-        return {name: tuple(field.value for field in self.ends[name]) for name in self.which.value}
 
 
 def bench_lines(
@@ -87,7 +62,7 @@ class Search(View):
         super().__init__(session, stops=True)
         widgets = panel().widgets
         self.engine = engine_form(session)
-        self.inputs = Bounds(INPUTS, "soc_cad")
+        self.inputs = Ranges("inputs", INPUTS, ["soc_cad"])
         self.limits = Form({name: (f"limit of {name}", "none") for name in LIMITS})
         self.seeker = widgets.Select(label="seeker", options=[*_SEEKERS], width=180)
         self.guide = widgets.Select(label="guide", options=_GUIDES, width=150)
@@ -108,7 +83,7 @@ class Search(View):
             side(self.engine, self.seeker, self.guide, self.wall_heat, self.cycles, self.seed, self.pace),
             self.inputs.layout, self.limits.layout(), side(button("Seek", self.begin, first=True), self.resume),
             card("An experiment from a file (TOML, task = \"seek\"), or the record of a rig (REC)",
-                 dropper(self.open, MOST_FILE_MB)),
+                 dropper(self.open, MOST_FILE_MB), collapsed=False),
             self.work.layout, self._said, self._pictures, self.same.layout,
         )  # fmt: skip
 

@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from mgdd.rig.live.figures import COLOURS, with_legend
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, File, Named, Script
 from mgdd.workbench.drop import dropper
@@ -23,7 +24,7 @@ from mgdd.workbench.parts import (
     table,
     text,
 )
-from mgdd.workbench.pictures import COLOURS, GREY, axis_text, canvas, line, runs, side_by_side, with_legend
+from mgdd.workbench.pictures import GREY, axis_text, canvas, line, runs, side_by_side
 from mgdd.workbench.session import MOST_FILE_MB, Session, file_word
 
 KINDS = ("guided", "pid", "sliding_mode", "linear_mpc", "nmpc")

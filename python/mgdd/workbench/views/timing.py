@@ -8,10 +8,12 @@ from typing import Any
 
 from mgdd import presets
 from mgdd.errors import ParameterError
+from mgdd.rig.live.figures import COLOURS, with_legend
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, Named, Script
-from mgdd.workbench.parts import Sliders, View, button, column, number, page, panel, side, table, text
-from mgdd.workbench.pictures import COLOURS, canvas, line, mark, side_by_side, with_legend
+from mgdd.workbench.forms import Sliders
+from mgdd.workbench.parts import View, button, column, number, page, panel, side, table, text
+from mgdd.workbench.pictures import canvas, line, mark, side_by_side
 from mgdd.workbench.session import MEAN, file_word, words
 from mgdd.workbench.views.files import Files
 
