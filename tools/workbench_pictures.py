@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tests" / "python" / "support"))
 from browser import CHROMIUM, Browser  # noqa: E402
 
 WIDTH = 1000
-HEIGHTS = {"check": 900, "cycles": 1560, "map": 1240}  # pixels
+HEIGHTS = {"check": 900, "cycles": 1250, "map": 1730}  # pixels
 
 
 def record(folder: Path) -> Path:
@@ -42,12 +42,13 @@ def take(page: Browser, name: str, folder: Path) -> None:
     page.call(
         "Emulation.setDeviceMetricsOverride", width=WIDTH, height=HEIGHTS[name], deviceScaleFactor=1, mobile=False
     )
+    page.evaluate("document.querySelectorAll('*').forEach((one) => { one.scrollTop = 0 })")
     time.sleep(2.0)
     file = folder / f"workbench_{name}.png"
     page.screenshot(file)
     from PIL import Image
 
-    Image.open(file).convert("RGB").quantize(128).save(file, optimize=True)
+    Image.open(file).convert("RGB").quantize(256).save(file, optimize=True)
 
 
 def main() -> None:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 GREY = "#8a8f98"
 _HEIGHT = 320  # pixels
 _TICKS = 5  # or their numbers run into each other on a telephone
-_COLUMNS = "repeat(auto-fit, minmax(min(460px, 100%), 1fr))"
 
 
 def bokeh(module: str) -> Any:
@@ -53,11 +52,10 @@ def _dressed(figure: Any) -> Any:
 
 def side_by_side(*figures: Any) -> Any:
     """Set figures side by side, as many as fit."""
-    pane = import_extra("panel", "workbench", "the workbench")
+    pane, flex = import_extra("panel", "workbench", "the workbench"), {"flex": "1 1 460px", "min-width": "280px"}
     return pane.FlexBox(
-        *(pane.Column(pane.pane.Bokeh(each, sizing_mode="stretch_width"), styles={"min-width": "0"})
-          for each in figures),
-        sizing_mode="stretch_width", gap="4px", styles={"display": "grid", "grid-template-columns": _COLUMNS},
+        *(pane.Column(pane.pane.Bokeh(each, sizing_mode="stretch_width"), styles=flex) for each in figures),
+        sizing_mode="stretch_width", gap="4px",
     )  # fmt: skip
 
 

@@ -6,7 +6,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from mgdd.rig.live.figures import COLOURS, with_legend
 from mgdd.workbench import work
 from mgdd.workbench.calls import Call, File, Named, Script
 from mgdd.workbench.drop import dropper
@@ -24,7 +23,7 @@ from mgdd.workbench.parts import (
     table,
     text,
 )
-from mgdd.workbench.pictures import GREY, axis_text, canvas, line, runs, side_by_side
+from mgdd.workbench.pictures import GREY, axis_text, line, runs, side_by_side, traces
 from mgdd.workbench.session import MOST_FILE_MB, Session, file_word
 
 KINDS = ("guided", "pid", "sliding_mode", "linear_mpc", "nmpc")
@@ -140,15 +139,9 @@ class Throttle(View):
         heads = ("controller", *(axis_text(first[name], name) for name in names))
         rows = [[escape(kind), *(number(run[name].item()) for name in names)] for kind, run in found.items()]
         self._figures.object = table(heads, rows, numbers=range(1, len(heads)))
-        drawn = []
-        for name in ("angle_deg", "duty"):
-            figure = canvas(axis_text(first["time_s"]), axis_text(first[name], name))
-            if name == "angle_deg":
-                line(figure, first["time_s"], first["reference_deg"], "reference", GREY, dash="dashed")
-            for colour, (kind, run) in zip(COLOURS, found.items(), strict=False):
-                line(figure, run["time_s"], run[name], kind, colour)
-            drawn.append(with_legend(figure))
-        self._tracks.objects = [side_by_side(*drawn)]
+        angle, duty = (traces(found, name, over="time_s") for name in ("angle_deg", "duty"))
+        line(angle, first["time_s"], first["reference_deg"], "reference", GREY, dash="dashed")
+        self._tracks.objects = [side_by_side(angle, duty)]
 
     def tuned(self) -> None:
         """Tune a controller for throttles around the preset."""
