@@ -35,39 +35,52 @@ _TABS = """
 """
 
 
+# Pages by the name of their view, in their order; those of `_OF_FILES` look at the files of the first one.
+_VIEWS: dict[str, type[Any]] = {
+    "files": Files, "check": Check, "cycles": Cycles, "timing": Timing, "search": Search, "map": Map,
+    "throttle": Throttle, "live": Live,
+}  # fmt: skip
+_OF_FILES = ("check", "cycles", "timing")
+
+
 class Bench:
-    """All views of one window."""
+    """All views of one window, each made when it is first looked at."""
 
     def __init__(self) -> None:
         self.session = Session()
-        self.files = Files(self.session, self.follow)
-        self.check, self.cycles, self.timing = Check(self.files), Cycles(self.files), Timing(self.files)
-        self.search, self.map, self.throttle, self.live = (
-            Search(self.session), Map(self.session), Throttle(self.session), Live(),
-        )  # fmt: skip
-        self.views = (self.files, self.check, self.cycles, self.timing, self.search, self.map, self.throttle, self.live)
+        self.made: dict[str, Any] = {"files": Files(self.session, self.follow)}
+        self._places = {name: panel().Column(sizing_mode="stretch_width") for name in _VIEWS}
+        self._places["files"].objects = [self.made["files"].layout]
         self.tabs = panel().Tabs(
-            *((view.title, view.layout) for view in self.views),
+            *((view.title, self._places[name]) for name, view in _VIEWS.items()),
             dynamic=True,
             sizing_mode="stretch_width",
             stylesheets=[_TABS],
         )
+        self.tabs.param.watch(lambda event: getattr(self, [*_VIEWS][event.new]), "active")
+
+    def __getattr__(self, name: str) -> Any:
+        """Give a view by name, made if it is not there yet."""
+        if name not in _VIEWS:
+            raise AttributeError(name)
+        if name not in self.made:
+            self.made[name] = _VIEWS[name](self.made["files"] if name in _OF_FILES else self.session)
+            self._places[name].objects = [self.made[name].layout]
+            self.follow()
+        return self.made[name]
 
     def follow(self) -> None:
-        """Let the other views follow the chosen file."""
-        if not hasattr(self, "views"):  # it is not ready yet
-            return
-        for view in (self.check, self.cycles, self.timing):
-            view.show()
-        for plant in (self.search, self.map):
-            plant.engine.options = self.session.engines
+        """Let the views that are there follow the chosen file, and the engines that were dropped."""
+        for name, view in self.made.items() if hasattr(self, "tabs") else ():
+            if name in _OF_FILES:
+                view.show()
+            elif name in ("search", "map"):
+                view.engine.options = self.session.engines
 
     def close(self) -> None:
         """End all work of the window, and forget its files."""
-        for view in self.views:
-            if hasattr(view, "work"):
-                view.work.end()
-        self.live.close()
+        for view in self.made.values():
+            view.close()
         self.session.close()
 
 

@@ -140,6 +140,10 @@ class View:
         self.same.show(script)
         self.work.begin(what, function, script, *given, **how)
 
+    def close(self) -> None:
+        """End what runs."""
+        self.work.end()
+
     def take(self, name: str, content: bytes) -> Path | None:
         """Take a file that is not one of pressure; None, and a sentence, where it cannot be."""
         try:
