@@ -44,7 +44,7 @@ _OF_FILES = ("check", "cycles", "timing")
 
 
 class Bench:
-    """All views of one window, each made when it is first looked at."""
+    """All views of one window, each made when it is first asked for."""
 
     def __init__(self) -> None:
         self.session = Session()
@@ -57,7 +57,6 @@ class Bench:
             sizing_mode="stretch_width",
             stylesheets=[_TABS],
         )
-        self.tabs.param.watch(lambda event: getattr(self, [*_VIEWS][event.new]), "active")
 
     def __getattr__(self, name: str) -> Any:
         """Give a view by name, made if it is not there yet."""
@@ -101,6 +100,8 @@ def window() -> Any:
     # Panel knows where its own files are only in a page, and not in one that comes back after its session was ended.
     pn.state.curdoc.template_variables.setdefault("dist_url", _FILES)
     bench = Bench()
+    for name in _VIEWS:  # now: Panel knows where its style sheets lie only while it makes a page
+        getattr(bench, name)
     pn.state.on_session_destroyed(lambda _: bench.close())
     dark = pn.config.theme == "dark"
     other = "default" if dark else "dark"
