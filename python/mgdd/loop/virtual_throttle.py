@@ -139,9 +139,10 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
         applied = self._applied
-        *self._waiting, duty = (applied["duty"], *self._waiting)
+        sent = (applied["duty"], *self._waiting)
+        self._waiting = sent[:-1]
         reading = self.step(
-            duty=duty,
+            duty=sent[-1],
             supply_v=applied["supply_v"],
             airflow_torque_nm=applied["airflow_torque_nm"],
             bridge_open=applied["bridge_open"] != 0.0,
