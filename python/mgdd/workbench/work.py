@@ -152,7 +152,7 @@ def experimented(watch: Watch, script: Script) -> dict[str, Any]:
         watch((dict(one.asked) | dict(measured.applied), measured.performance, dict(measured.limits)))
 
     found = script.run(cycle, wraps={"experiment": seeks})["found"]
-    return _search(found, found.dataset, [*found.figures["findings"], *found.events])
+    return _search(found, found.dataset, [*(each["text"] for each in found.figures["findings"]), *found.events])
 
 
 def recorded(watch: Watch, script: Script) -> dict[str, Any]:

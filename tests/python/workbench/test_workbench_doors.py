@@ -116,6 +116,10 @@ def test_an_experiment_seeks_as_its_command_does(bench: Any, folder: Path, capsy
     assert (own.done_cycles, own.total, own.drawn_limits) == (40, 40, {"p_max_bar": 110.0})
     assert len(own._sources["p_max_bar"].data["x"]) == len(own._sources["estimate soc_cad"].data["x"]) == 40
     assert own.resume.disabled
+    unlimited = 'kind = "experiment"\nformat = 1\ntask = "seek"\n[seek]\ncycles = 50\n'
+    own.open("free.toml", unlimited.encode())
+    assert "may be noise" in own._said.object  # a finding stands as text
+    own.open("seek.toml", SEEK.encode())
     asked = run_command(f"{own.same.script.shell} --folder run", capsys)
     assert asked["result"]["inputs"] == pytest.approx(own.found["result"]["result"]["inputs"], rel=1e-9)
     again = run_python(own.same.script.python)["found"]
