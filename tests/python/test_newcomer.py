@@ -179,7 +179,10 @@ def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
         (lambda: mgdd.engine.simulate(3.0), "cylinder = 3.0: must be a Cylinder, a preset, or the name of one"),
         (lambda: mgdd.engine.simulate("puma_single", 1200), r"point = 1200: must be an OperatingPoint.*'speed_rpm'"),
         (lambda: mgdd.throttle.simulate_throttle("puma_single", 0.5), "is an engine, not a throttle"),
-        (lambda: mgdd.loop.VirtualThrottle(3.0), "throttle = 3.0: must be a Throttle, a preset, or the name of one"),
+        (
+            lambda: mgdd.loop.VirtualThrottle(3.0),
+            "throttle = 3.0: must be a Throttle, a first-principle fit of one, a preset",
+        ),
         (lambda: mgdd.loop.VirtualEngine(3.0), "cylinder = 3.0: must be a Cylinder"),
         (lambda: mgdd.maps.write_map(3.0, "a.csv"), "table = 3.0: must be a CalibrationMap"),
         (lambda: mgdd.engine.find_optimum("puma_single", limits=95.0), "limits = 95.0: must map names to numbers"),

@@ -28,6 +28,7 @@ _CSS = """
 body { margin: 0; background: var(--panel-background-color); color: var(--panel-on-background-color); }
 #header { font-family: system-ui, sans-serif; }
 """
+_DARK = ":root { color-scheme: dark; }"  # of the arrows in fields, which the browser draws
 _TABS = """
 :host { grid-template-columns: minmax(0, 1fr) !important; }
 .bk-header, .bk-headers-wrapper { flex-wrap: wrap !important; overflow: visible !important; height: auto; }
@@ -35,50 +36,36 @@ _TABS = """
 """
 
 
-# Pages by the name of their view, in their order; those of `_OF_FILES` look at the files of the first one.
-_VIEWS: dict[str, type[Any]] = {
-    "files": Files, "check": Check, "cycles": Cycles, "timing": Timing, "search": Search, "map": Map,
-    "throttle": Throttle, "live": Live,
-}  # fmt: skip
-_OF_FILES = ("check", "cycles", "timing")
-
-
 class Bench:
-    """All views of one window, each made when it is first asked for."""
+    """All views of one window."""
 
     def __init__(self) -> None:
         self.session = Session()
-        self.made: dict[str, Any] = {"files": Files(self.session, self.follow)}
-        self._places = {name: panel().Column(sizing_mode="stretch_width") for name in _VIEWS}
-        self._places["files"].objects = [self.made["files"].layout]
+        self.files = Files(self.session, self.follow)
+        self.check, self.cycles, self.timing = Check(self.files), Cycles(self.files), Timing(self.files)
+        self.search, self.map, self.throttle, self.live = (
+            Search(self.session), Map(self.session), Throttle(self.session), Live(),
+        )  # fmt: skip
+        self.views = (self.files, self.check, self.cycles, self.timing, self.search, self.map, self.throttle, self.live)
         self.tabs = panel().Tabs(
-            *((view.title, self._places[name]) for name, view in _VIEWS.items()),
+            *((view.title, view.layout) for view in self.views),
             dynamic=True,
             sizing_mode="stretch_width",
             stylesheets=[_TABS],
         )
 
-    def __getattr__(self, name: str) -> Any:
-        """Give a view by name, made if it is not there yet."""
-        if name not in _VIEWS:
-            raise AttributeError(name)
-        if name not in self.made:
-            self.made[name] = _VIEWS[name](self.made["files"] if name in _OF_FILES else self.session)
-            self._places[name].objects = [self.made[name].layout]
-            self.follow()
-        return self.made[name]
-
     def follow(self) -> None:
         """Let the views that are there follow the chosen file, and the engines that were dropped."""
-        for name, view in self.made.items() if hasattr(self, "tabs") else ():
-            if name in _OF_FILES:
-                view.show()
-            elif name in ("search", "map"):
-                view.engine.options = self.session.engines
+        if not hasattr(self, "views"):  # it is not ready yet
+            return
+        for view in (self.check, self.cycles, self.timing):
+            view.show()
+        for plant in (self.search, self.map):
+            plant.engine.options = self.session.engines
 
     def close(self) -> None:
         """End all work of the window, and forget its files."""
-        for view in self.made.values():
+        for view in self.views:
             view.close()
         self.session.close()
 
@@ -100,14 +87,16 @@ def window() -> Any:
     # Panel knows where its own files are only in a page, and not in one that comes back after its session was ended.
     pn.state.curdoc.template_variables.setdefault("dist_url", _FILES)
     bench = Bench()
-    for name in _VIEWS:  # now: Panel knows where its style sheets lie only while it makes a page
-        getattr(bench, name)
     pn.state.on_session_destroyed(lambda _: bench.close())
     dark = pn.config.theme == "dark"
     other = "default" if dark else "dark"
     switch = pn.pane.HTML(f"<a style='color:white' href='?theme={other}'>{'light' if dark else 'dark'}</a>")
     return _template()(
-        title="mgdd workbench", main=[bench.tabs], header=[switch], raw_css=[_CSS], theme=pn.config.theme
+        title="mgdd workbench",
+        main=[bench.tabs],
+        header=[switch],
+        raw_css=[_CSS, _DARK] if dark else [_CSS],
+        theme=pn.config.theme,
     )
 
 

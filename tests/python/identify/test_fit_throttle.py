@@ -147,8 +147,8 @@ def test_the_throttle_of_a_model_moves_as_it_does(groups, least):
 def test_a_model_is_no_throttle_with_currents_until_the_rest_is_known():
     fit = fit_plain(two_sided_log())
     for given in (fit, fit.model):
-        with pytest.raises(ParameterError, match=r"\.to_throttle\(resistance_ohm="):
-            VirtualThrottle(given)
+        with pytest.raises(ParameterError, match=r"to_throttle\(\.\.\.\)"):
+            VirtualThrottle(given, inputs=("duty", "supply_v"))
     throttle = fit.model.to_throttle(resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=0.383)
     run = track(tuned_controller("guided", throttle), np.repeat([20.0, 60.0], 500), throttle=throttle)
     assert abs(float(run["angle_deg"][-1]) - 60.0) < 0.5

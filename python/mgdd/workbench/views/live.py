@@ -9,7 +9,6 @@ from typing import Any
 from mgdd.errors import Error
 from mgdd.rig import watch
 from mgdd.workbench.parts import button, column, page, panel, side, text
-from mgdd.workbench.session import Session
 
 
 class Live:
@@ -17,7 +16,7 @@ class Live:
 
     title = "Live"
 
-    def __init__(self, _: Session) -> None:
+    def __init__(self) -> None:
         self.source = panel().widgets.TextInput(
             label="folder of a run, a record, or simulate", value="simulate", width=320, align="end"
         )
