@@ -28,7 +28,6 @@ _CSS = """
 body { margin: 0; background: var(--panel-background-color); color: var(--panel-on-background-color); }
 #header { font-family: system-ui, sans-serif; }
 """
-_DARK = ":root { color-scheme: dark; }"  # of the arrows in fields, which the browser draws
 _TABS = """
 :host { grid-template-columns: minmax(0, 1fr) !important; }
 .bk-header, .bk-headers-wrapper { flex-wrap: wrap !important; overflow: visible !important; height: auto; }
@@ -95,7 +94,7 @@ def window() -> Any:
         title="mgdd workbench",
         main=[bench.tabs],
         header=[switch],
-        raw_css=[_CSS, _DARK] if dark else [_CSS],
+        raw_css=[_CSS],
         theme=pn.config.theme,
     )
 

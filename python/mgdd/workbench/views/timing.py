@@ -19,6 +19,7 @@ from mgdd.workbench.views.files import Files
 
 _LIMITS = {"p_max_bar": ("p_max at most [bar]", 400.0), "dp_max_bar_per_cad": ("dp_max at most [bar/°CA]", 30.0)}
 _OPEN = {"not determined": "no direction is determined", "earlier": "earlier", "later": "later"}
+_EMPTY = "Drop traces and state the engine on the first page."
 
 
 class Timing(View):
@@ -32,7 +33,7 @@ class Timing(View):
         self.rows: list[dict[str, Any]] = []
         self.traces = widgets.MultiChoice(label="traces, all of one engine", options=[], width=300)
         self.limits = Sliders(_LIMITS)
-        self._answers = page(text("Drop traces and state the engine on the first page.", "quiet"))
+        self._answers = page(text(_EMPTY, "quiet"))
         self._picture = column()
         start = button("Calibrate", self.calibrate, first=True)
         self.layout = column(
@@ -46,6 +47,8 @@ class Timing(View):
         if self.traces.options != names:
             before = self.traces.options
             self.traces.options = names
+            if not self.rows:
+                self._answers.object = "" if names else text(_EMPTY, "quiet")
             if not self.traces.value or self.traces.value == before:
                 self.traces.value = names
 
