@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -68,6 +69,8 @@ class Plate:
 
 def require_loop_delay(delay_samples: int) -> None:
     """Refuse a delay between controller and bridge that the loops do not run."""
+    whole = isinstance(delay_samples, numbers.Integral)
+    ParameterError.unless(whole, "delay_samples", delay_samples, "a whole number in [0, 20]")
     ParameterError.unless(0 <= delay_samples <= 20, "delay_samples", delay_samples, "in [0, 20]")
 
 

@@ -73,6 +73,9 @@ def dropper(dropped: Callable[[str, bytes], object], most_mb: int, *, several: b
         name, data, first, last = (message.data[key] for key in ("name", "data", "first", "last"))
         if first:
             pieces[name] = []
+        if name not in pieces or sum(map(len, pieces[name])) + len(data) > most_mb << 20:
+            pieces.pop(name, None)  # the page refuses what is too large; another client is not listened to
+            return
         pieces[name].append(bytes(data))
         if last:
             dropped(name, b"".join(pieces.pop(name)))

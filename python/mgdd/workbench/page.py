@@ -22,7 +22,7 @@ from mgdd.workbench.views.timing import Timing
 
 _FILES = "static/extensions/panel/"
 _UNUSED_MS = 60_000  # a window that lost its server may come back so long
-_MESSAGE_BYTES = 16_000_000  # of the websocket: a file comes in pieces of ten million
+_MESSAGE_BYTES = 16_000_000  # of the websocket: a file comes in pieces of eight million
 _CSS = """
 :host, :root { --bokeh-base-font: system-ui, sans-serif; }
 body { margin: 0; background: var(--panel-background-color); color: var(--panel-on-background-color); }

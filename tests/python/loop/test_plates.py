@@ -176,6 +176,8 @@ class Lost(Leaf):
         (lambda: simulate_throttle(FIT, 0.3, bridge="open"), ParameterError, "bridge"),
         (lambda: VirtualThrottle(FIT, inputs=("duty", "supply_v")), ParameterError, "inputs = 'supply_v'.*to_throttle"),
         (lambda: VirtualThrottle(PseudoWiener("pw_r", {})), ParameterError, "first-principle fit"),
+        (lambda: VirtualThrottle(delay_samples=2.5), ParameterError, "delay_samples = 2.5: must be a whole number"),
+        (lambda: track(PID, "step:40:42", delay_samples=2.5), ParameterError, "delay_samples = 2.5: must be a whole"),
         (lambda: VirtualThrottle(delay_samples=21), ParameterError, r"delay_samples = 21: must be in \[0, 20\]"),
         (lambda: track(PID, "step:40:42", throttle="P9.toml"), (DataError, FileNotFoundError), "P9"),
     ],

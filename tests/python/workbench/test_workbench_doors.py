@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mgdd.rig import Experiment, run_experiment
+from mgdd.workbench.drop import dropper
 from pressure_files import CYCLES, FULL, writer_in
 from workbench_views import bench, run_command, run_python, said
 
@@ -192,3 +193,21 @@ def test_a_sweep_under_an_impossible_limit_says_so(bench: Any) -> None:
     assert "p_max_bar" in said(own.work)
     assert "raise a limit" in said(own.work)
     assert own.made == {}
+
+
+def test_a_client_that_sends_more_than_the_page_would_is_not_kept() -> None:
+    from panel.models.esm import DataEvent
+
+    taken: list[tuple[str, int]] = []
+    place = dropper(lambda name, content: taken.append((name, len(content))), 1)
+
+    def sends(data: bytes, *, first: bool, last: bool) -> None:
+        message = {"name": "a.csv", "data": data, "first": first, "last": last}
+        place._process_event(DataEvent(None, data=message))
+
+    half = b"1" * (600 << 10)
+    sends(half, first=True, last=False)
+    sends(half, first=False, last=False)
+    sends(b"1", first=False, last=True)
+    sends(half, first=True, last=True)
+    assert taken == [("a.csv", len(half))]

@@ -79,8 +79,8 @@ class Map(View):
         spans = self.axes.values
         inputs = {"soc_cad": tuple(field.value for field in self.timing)}
         lines, command = bench_lines(self.session, self.engine.value, inputs, self.limits.values, int(self.seed.value))
-        own = tuple(f"--{name.replace('_', '-')}=" for name in spans)  # an axis is no fixed value
-        return lines, [word for word in command if not word.startswith(own)], _grid(spans)
+        varied = tuple(f"--{name.replace('_', '-')}=" for name in spans)
+        return lines, [word for word in command if not word.startswith(varied)], _grid(spans)
 
     def script(self) -> Script:
         """Write the search."""
